@@ -29,6 +29,7 @@ mod frame;
 mod impact;
 mod modes;
 mod motion;
+mod outputs;
 mod polynomial;
 mod table;
 mod watch;
@@ -37,6 +38,7 @@ pub use domains::System;
 pub use frame::Frame;
 pub use impact::LOWEST_FLIGHT;
 pub use motion::MachineMotion;
+pub use outputs::{Outputs, Situation};
 pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_HARMONICS, STATE, State};

@@ -22,7 +22,7 @@ pub use law::{Contact, Law};
 pub use non_impacting::NonImpacting;
 pub use oscillator::{
     Drive, DryFriction, Forces, GapRow, HIGHEST_ORDER, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS,
-    MOST_HARMONICS, MOST_WALLS, Oscillator, Restitution, Spring, Wall,
+    MOST_HARMONICS, MOST_SIGNALS, MOST_WALLS, Oscillator, Restitution, Signal, Spring, Wall,
 };
 pub(crate) use pair::is_semidefinite;
 pub use pair::{Domain, Form, Harmonic, OuterWall, Pair, Stage};

@@ -46,7 +46,9 @@ use crate::model::{Side, State};
 use crate::named;
 use crate::word::Word;
 
-pub use crate::motion::{DISPLACEMENTS, EventKind, SlipKind, place_of_displacement, place_of_gap};
+pub use crate::motion::{
+    DISPLACEMENTS, EventKind, SlipKind, place_of_displacement, place_of_gap, place_of_signal,
+};
 
 /// One event on a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,8 +10,8 @@ const NODES: u32 = 6u;
 const EXTREME_ITERATIONS: u32 = 6u;
 
 // Places in `sums`. Integrals: gap and x; squares of both displacements and of the gap; gap and x times the phasor; power of the dampers;
-// square of the contact force; contact time. Sums over events: approach speeds, lost energy, number of contacts. Last: number of measured
-// periods.
+// square of the contact force; contact time. Sums over events: approach speeds, lost energy, energy released by walls that only push,
+// number of contacts. Last: number of measured periods.
 const SUM_Z: u32 = 0u;
 const SUM_X: u32 = 1u;
 const SUM_SQUARES: u32 = 2u;
@@ -24,8 +24,9 @@ const SUM_FORCE: u32 = 10u;
 const SUM_CONTACT: u32 = 11u;
 const SUM_APPROACH: u32 = 12u;
 const SUM_LOST: u32 = 13u;
-const SUM_COUNT: u32 = 14u;
-const SUM_PERIODS: u32 = 15u;
+const SUM_RELEASED: u32 = 14u;
+const SUM_COUNT: u32 = 15u;
+const SUM_PERIODS: u32 = 16u;
 // Places in `highs` and `lows`: both displacements, the gap, the contact force; and the largest approach speed.
 const FORCE: u32 = 3u;
 const APPROACH: u32 = 4u;

@@ -81,7 +81,7 @@ fn measure_push() {
     let sign = select(Real(1.0), Real(-1.0), is_open());
     let depth = abs(motion.q[0] - at);
     let preload = sign * (push[2] + push[0] * at);
-    add(SUM_LOST, sign * (abs(push[0]) * depth + 2.0 * preload) * depth);
+    add(SUM_RELEASED, sign * (abs(push[0]) * depth + 2.0 * preload) * depth);
 }
 
 // Enters open or closed contact where the force has the wrong sign for the present interval.

@@ -41,7 +41,7 @@ pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
         quantities: std::iter::repeat_n(Dimension::None, AVERAGES)
             .map(|dimension| Compared { name: String::new(), dimension, is_odd: false })
             .chain(measures::all().map(|measure| Compared {
-                name: measure.name(&[], &[]),
+                name: String::new(),
                 dimension: measure.dimension(),
                 is_odd: measure.is_odd(),
             }))

@@ -322,7 +322,7 @@ impl Measured {
 const DIM: usize = STATE;
 
 /// Sums and extremes that a lane measures; `shaders/pair/measure.wgsl` has their places.
-pub(super) const SUMS: usize = 16;
+pub(super) const SUMS: usize = 17;
 pub(super) const EXTREMES: usize = 5;
 
 /// Numbers for a word and a pattern in a [`Finding`].

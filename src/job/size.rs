@@ -11,7 +11,7 @@ use crate::map::engine::{LARGEST_BATCH, largest_batch};
 use crate::map::plan::{Cell, Parts, stores_flows};
 use crate::map::scene::{Format, Quantity, Scene, Steps};
 use crate::map::shard::Shard;
-use crate::model_file::several_gaps;
+use crate::model_file::{several_gaps, subjects};
 use crate::record::Record;
 use crate::store::folder::Folder;
 use crate::store::map;
@@ -327,9 +327,7 @@ fn state_bytes(scene: &Scene) -> u64 {
 
 /// Bytes of the numbers of a measured quantity.
 fn numbers(scene: &Scene, quantity: Quantity) -> u64 {
-    let model = scene.base();
-    let gaps = several_gaps(model).unwrap_or_default();
-    8 * quantity.columns(&model.state_names(), &gaps).len() as u64
+    8 * quantity.columns(&subjects(scene.base())).len() as u64
 }
 
 fn list_rows(scene: &Scene) -> u64 {
@@ -477,8 +475,8 @@ mod tests {
                 periods_run: 100,
                 ..Record::default()
             };
-            let names = scene.base().state_names();
-            for measure in measures::all().filter(|measure| measure.is_of(&names, &[])) {
+            let names = subjects(scene.base());
+            for measure in measures::all().filter(|measure| measure.is_of(&names)) {
                 record.measures[measure.place] = 0.5;
             }
             record.clear_measures(|group| !needs.has(group));

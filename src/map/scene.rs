@@ -37,7 +37,7 @@ pub(crate) use points::Points;
 pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};
 pub use start::{Draw, Start};
 
-use crate::model_file::{FileModel, MODEL_FILE, several_gaps};
+use crate::model_file::{FileModel, MODEL_FILE, subjects};
 use crate::text::document::{self, Node};
 use crate::text::error;
 use crate::text::section::{self, Section};
@@ -220,9 +220,8 @@ impl Scene {
 
     /// Refuses a measured quantity whose column has the name of a swept parameter.
     fn check_columns(&self, root: &Section<'_>) -> Result<(), SceneError> {
-        let (states, gaps) = (self.base().state_names(), several_gaps(self.base()).unwrap_or_default());
-        let mut columns =
-            self.outputs.quantities.iter().flat_map(|quantity| quantity.columns(&states, &gaps));
+        let names = subjects(self.base());
+        let mut columns = self.outputs.quantities.iter().flat_map(|quantity| quantity.columns(&names));
         let twice = columns.find(|name| self.swept().any(|parameter| parameter.name == **name));
         let outputs = root.section("outputs", &keys::names("outputs"))?;
         match (twice, outputs.get("quantities")) {

@@ -10,6 +10,7 @@ use super::contact::{self, Wall, WallLaw, WallSpring};
 use super::entry::{Names, Staged};
 use super::friction::{self, DryFriction};
 use super::motion::{self, MotionTable};
+use super::signal::{self, Signal};
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
 use crate::text::error::SceneError;
@@ -18,8 +19,9 @@ use crate::text::section::{Field, Section};
 
 /// Keys outside of any table, and the names of the tables.
 #[rustfmt::skip]
-const MODEL_KEYS: [&str; 10] = [
+const MODEL_KEYS: [&str; 11] = [
     "name", "title", "summary", "source", "notes", "parameters", "motion", "harmonic", "contact", "friction",
+    "signal",
 ];
 
 /// Largest number of characters of a model's name, which occurs in scenes and file names.
@@ -56,6 +58,8 @@ pub struct Definition {
     pub walls: Vec<[Vec<Wall>; 2]>,
     /// Dry friction.
     pub friction: Vec<DryFriction>,
+    /// Signals.
+    pub signals: Vec<Signal>,
     /// Whether the oscillator is a pair, whose law is not part of it.
     is_pair: bool,
 }
@@ -83,6 +87,8 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let states: Vec<&str> = motion.state_names().collect();
     let names = Names { states: &states, stages: motion.stages.len(), ..names };
     let friction = friction::read(&root, names, motion.degrees())?;
+    let gaps: Vec<&str> = motion.gaps.iter().filter_map(|gap| gap.name.as_deref()).collect();
+    let signals = signal::read(&root, names, &gaps, motion.degrees())?;
     let defaults: Vec<f64> = written.iter().map(|parameter| parameter.default).collect();
     let walls = contact::read(&root, names, &motion.gaps, &defaults, !friction.is_empty())?;
     let mut definition = Definition {
@@ -97,6 +103,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
         motion,
         walls,
         friction,
+        signals,
         is_pair: false,
     };
     definition.is_pair = definition.is_pair();
@@ -160,7 +167,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
                 is_on_side && before == nth
             }
             (Table::Harmonic(order), Some(Value::Integer(own))) => *own == order,
-            (Table::Friction(nth), _) => {
+            (Table::Friction(nth) | Table::Signal(nth), _) => {
                 before += 1;
                 before == nth
             }
@@ -171,6 +178,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
     let list = match table {
         Table::Harmonic(_) => "harmonic",
         Table::Friction(_) => "friction",
+        Table::Signal(_) => "signal",
         Table::Motion | Table::Gap(_) | Table::Wall(..) => "contact",
     };
     let items = root.get(list).and_then(|field| field.list("").ok()).unwrap_or_default();
@@ -195,6 +203,8 @@ enum Table {
     Harmonic(i64),
     /// An element with dry friction, counted from 1.
     Friction(usize),
+    /// A signal, counted from 1.
+    Signal(usize),
 }
 
 /// Returns the table and the key of the quantity that an error names.
@@ -209,6 +219,9 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
         // The determinant is that of both rows.
         let last = definition.friction.len();
         return (Table::Friction(nth.trim().parse().unwrap_or(last)), key.unwrap_or("row"));
+    }
+    if let Some((_, nth)) = quantity.rsplit_once("of signal ") {
+        return (Table::Signal(nth.parse().unwrap_or(1)), "name");
     }
     if quantity == "rigid walls" {
         return (Table::Friction(MOST_FRICTION), "force");
@@ -258,7 +271,8 @@ impl Definition {
         let walls = || self.walls.iter().flatten().flatten();
         let oscillator = self.motion.entries().any(uses)
             || walls().flat_map(Wall::shaping_oscillator).any(uses)
-            || self.friction.iter().flat_map(DryFriction::entries).any(uses);
+            || self.friction.iter().flat_map(DryFriction::entries).any(uses)
+            || self.signals.iter().flat_map(Signal::entries).any(uses);
         let law = walls().flat_map(Wall::shaping_law).any(uses);
         // The laws of a machine are part of it.
         if self.is_pair { Shapes::new(oscillator, law) } else { Shapes::new(oscillator || law, false) }
@@ -291,7 +305,11 @@ impl Definition {
             sin: values.vector(sin.iter()),
         };
         let first = drive(1, &motion.force, &motion.force_sin);
-        let acts = first.cos.iter().chain(&first.sin).any(|&factor| factor != 0.0);
+        let signals = self.signals.iter().map(|signal| signal.evaluated(|entry| values.of(entry)));
+        let signals: Vec<_> = signals.collect();
+        // A signal with a wave needs the first harmonic, even where no force acts.
+        let acts = first.cos.iter().chain(&first.sin).any(|&factor| factor != 0.0)
+            || signals.iter().any(|signal| signal.waves != [0.0; 2]);
         let further = motion.harmonics.iter().map(|h| drive(h.order, &h.cos, &h.sin));
         let gap = |nth: usize| {
             let side = |side: Side| {
@@ -320,6 +338,7 @@ impl Definition {
             drives: acts.then_some(first).into_iter().chain(further).collect(),
             gaps: (0..motion.gaps.len()).map(gap).collect::<Result<_, OscillatorError>>()?,
             friction: self.friction.iter().map(|own| own.evaluated(|entry| values.of(entry))).collect(),
+            signals,
         })
     }
 

@@ -7,6 +7,7 @@ use super::definition::Definition;
 use super::entry::Entry;
 use super::friction::DryFriction;
 use super::motion::MotionTable;
+use super::signal::Signal;
 use crate::text::expression::Expression;
 
 /// Returns the equations as lines: gaps, stages, friction, and one equation per coordinate with a contact force for each gap that has
@@ -23,6 +24,7 @@ pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<Strin
         let rate = sliding_rate(friction, motion);
         format!("friction  sticks at {rate} = 0 while |friction force| <= {}", text(&friction.force))
     }));
+    lines.extend(definition.signals.iter().map(|signal| signal_line(signal, motion)));
     let force = |(gap, [z, _]): (&[Vec<Wall>; 2], &[String; 2])| {
         let has_walls = gap.iter().any(|walls| !walls.is_empty());
         has_walls.then(|| if names.len() == 1 { "N".to_owned() } else { format!("N_{z}") })
@@ -106,6 +108,20 @@ fn stages(motion: &MotionTable) -> Vec<String> {
         format!("stages  {begins} of {span}"),
         format!("        [{stages}] lists the values of an entry that changes"),
     ]
+}
+
+/// Returns the definition of a signal, such as `signal  seat = x'' - A*omega^2 cos(omega t)`.
+fn signal_line(signal: &Signal, motion: &MotionTable) -> String {
+    let rows = signal.rows.iter().zip(["", "'", "''"]).flat_map(|(row, suffix)| {
+        row.iter()
+            .zip(&motion.coordinates)
+            .map(move |(entry, name)| product(entry, &format!("{name}{suffix}")))
+    });
+    let [own, cos, sin] = &signal.constants;
+    let phase = phase(&motion.frequency, 1);
+    let waves =
+        [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})")), constant(own)];
+    format!("signal  {} = {}", signal.name, sum(rows.chain(waves)))
 }
 
 /// Returns the friction whose force is not the number 0.

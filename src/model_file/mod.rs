@@ -14,6 +14,7 @@ mod friction;
 mod harmonic;
 mod motion;
 mod parameters;
+mod signal;
 #[cfg(test)]
 mod tests;
 
@@ -27,7 +28,9 @@ pub use definition::Definition;
 pub use entry::Staged;
 pub use friction::DryFriction;
 pub use harmonic::HarmonicForce;
+pub use signal::Signal;
 
+use crate::record::measures::Subjects;
 use crate::text::error::SceneError;
 
 /// A model from a file, with values of its parameters and a start phase. Clones share everything else.
@@ -132,6 +135,16 @@ pub fn letters(model: &dyn Model) -> Option<String> {
     Some(letters.collect::<Vec<_>>().join(", "))
 }
 
+/// Returns the names of what measured numbers of a model describe.
+pub fn subjects(model: &dyn Model) -> Subjects {
+    let signals = model.downcast_ref::<FileModel>().map(|model| &model.definition.signals[..]);
+    Subjects {
+        states: model.state_names().into_iter().map(str::to_owned).collect(),
+        gaps: several_gaps(model).unwrap_or_default(),
+        signals: signals.unwrap_or_default().iter().map(|signal| signal.name.clone()).collect(),
+    }
+}
+
 /// Returns the names of a model's gaps, if it has several.
 pub fn several_gaps(model: &dyn Model) -> Option<Vec<String>> {
     let symbols = model.downcast_ref::<FileModel>()?.gap_symbols();
@@ -201,7 +214,8 @@ impl Model for FileModel {
     }
 
     fn units(&self) -> Units {
-        self.definition.motion.units.clone()
+        let signals = self.definition.signals.iter().map(|signal| signal.unit.clone()).collect();
+        Units { signals, ..self.definition.motion.units.clone() }
     }
 
     fn bodies(&self) -> Vec<&str> {

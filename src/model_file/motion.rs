@@ -225,7 +225,7 @@ fn read_units(section: &Section<'_>, count: usize, gaps: &[Gap]) -> Result<Units
     let used = entries.filter(|(entry, _)| entry.as_number() != Some(0.0));
     let mut used = used.map(|(entry, unit)| entry.as_number().and(unit.clone()));
     let common = used.next().flatten().filter(|first| used.all(|unit| unit.as_ref() == Some(first)));
-    Ok(Units { coordinates, gap: given.or(common), time, force })
+    Ok(Units { coordinates, gap: given.or(common), time, force, signals: Vec::new() })
 }
 
 fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {

@@ -620,6 +620,65 @@ fn phases_out_of_order_are_found_for_later_values() {
     );
 }
 
+/// A signal for a model of two degrees of freedom.
+const SIGNAL: &str = r#"
+[[signal]]
+name = "seat"
+displacement = ["c/d", -1]
+acceleration = [1, 0]
+constant = "k"
+cos = "-c"
+unit = "m/s^2"
+"#;
+
+#[test]
+fn signals_are_read_and_written_in_usual_notation() {
+    let model = read(&(TWO_DEGREES.to_owned() + SIGNAL));
+    let row = |entries: [f64; 2]| DVector::from_row_slice(&entries);
+    let signal = model::Signal {
+        displacement: row([2.0, -1.0]),
+        velocity: row([0.0, 0.0]),
+        acceleration: row([1.0, 0.0]),
+        constant: 3.0,
+        waves: [-0.5, 0.0],
+    };
+    let oscillator = model.oscillator().unwrap();
+    assert_eq!(oscillator.signals, [signal]);
+    assert_eq!(oscillator.needs_machine(), Some("signals"));
+    let lines = model.equations();
+    let line = lines.iter().find(|line| line.starts_with("signal")).unwrap();
+    assert_eq!(line, "signal  seat = c/d a - b + a'' - c cos(1.5 t) + k");
+    assert_eq!(subjects(&model).signals, ["seat"]);
+    assert_eq!(model.units().signals, [Some("m/s^2".to_owned())]);
+    let unforced =
+        TWO_DEGREES.lines().filter(|line| !line.starts_with("force")).collect::<Vec<_>>().join("\n");
+    let drives = |text: &str| read(&(unforced.clone() + text)).oscillator().unwrap().drives.len();
+    assert_eq!((drives(SIGNAL), drives(&SIGNAL.replace("cos = \"-c\"", ""))), (1, 0));
+}
+
+#[test]
+fn errors_in_signals_name_the_field() {
+    check_refusals(
+        &(TWO_DEGREES.to_owned() + SIGNAL),
+        r#"
+name = "seat" | | `signal.0.name` is missing
+name = "seat" | name = "a" | `signal.0.name = "a"` does not fit: `a` is already the name of a parameter, a coordinate, a velocity, a gap or a signal
+name = "seat" | name = "rms_gap" | `signal.0.name = "rms_gap"` does not fit: `rms_gap` is a column of tables
+["c/d", -1] | [1] | `signal.0.displacement = [1]` is out of range: it must be a row of the signal: a list of two entries
+displacement | shift | unknown field `signal.0.shift
+constant = "k" | constant = "1/0" | `signal.0.name = "seat"` does not fit: at the defaults of
+"#,
+    );
+    let rows = SIGNAL.lines().filter(|line| !line.contains('[') || line.contains("[[")).collect::<Vec<_>>();
+    let error =
+        FileModel::parse(&(TWO_DEGREES.to_owned() + &rows.join("\n")), "m.toml").unwrap_err().to_string();
+    assert!(error.contains("`signal.0.displacement` is missing"), "{error}");
+    let five = TWO_DEGREES.to_owned()
+        + &(0..5).map(|i| SIGNAL.replace("seat", &format!("s{i}"))).collect::<String>();
+    let error = FileModel::parse(&five, "m.toml").unwrap_err().to_string();
+    assert!(error.contains("at most 4 tables, [[signal]]"), "{error}");
+}
+
 /// Friction for a model of two degrees of freedom.
 const FRICTION: &str = r#"
 [[friction]]
@@ -671,6 +730,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
         drives: vec![Drive { order: 1, cos: row(6.0), sin: row(0.0) }],
         gaps: vec![GapRow { row: row(1.0), walls: [vec![], vec![]] }],
         friction: vec![DryFriction { row: row(1.0), force: 1.5, speed: 0.0 }],
+        signals: Vec::new(),
     };
     assert_eq!(model.oscillator().unwrap(), by_hand);
     assert_eq!(
@@ -859,6 +919,7 @@ fn a_model_of_three_coordinates_and_two_gaps_is_a_machine() {
             GapRow { row: row([0.0, 1.0, -0.5]), walls: [vec![elastic, impact], vec![]] },
         ],
         friction: vec![DryFriction { row: row([0.0, 0.0, 2.0]), force: 0.2 * 3.0, speed: 0.8 }],
+        signals: Vec::new(),
     };
     assert_eq!(machine(&model), by_hand);
     assert_eq!((by_hand.degrees(), by_hand.omega), (3, 1.5));

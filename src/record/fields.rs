@@ -1,7 +1,7 @@
 //! The fields of a record as rows of numbers, for files and messages.
 
 use super::Record;
-use super::measures::{FURTHER, GROUPS, MEASURES, OF_GAPS, places_before};
+use super::measures::{FURTHER, GROUPS, MEASURES, OF_GAPS, OF_SIGNALS, places_before};
 use rattlemap_dynamics::model::STATE;
 
 /// A field of a record, or the measured quantities of a group.
@@ -101,15 +101,25 @@ const BEFORE: [Field; 16] = [
 /// Place of the strobe state in [`FIELDS`].
 pub const STROBE: usize = 4;
 
-/// All fields in the order of files. The last but one has the measured quantities of displacements and gaps that oscillators of at most
-/// two coordinates with one gap do not have, the last one those of each of several gaps.
-pub const FIELDS: [Field; BEFORE.len() + GROUPS.len() + 2] = {
+/// Number of groups with a field of their own.
+const GROUP_FIELDS: usize = 12;
+
+/// All fields in the order of files. The last but two has the measured quantities of displacements and gaps that oscillators of at most
+/// two coordinates with one gap do not have, the next one those of each of several gaps. The last one has the only number of the last
+/// group, and those of signals.
+pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
     let further = field!("further_displacements", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
-    let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUPS.len() + 2];
+    let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUP_FIELDS + 3];
     let mut i = fields.len() - 1;
-    fields[i] = Field { name: "gaps", first: OF_GAPS, count: MEASURES - OF_GAPS, ..further };
+    fields[i] = field!("release_energy_and_signals", 1 + MEASURES - OF_SIGNALS, 8, |record, nth| record
+        .measures[match nth {
+        0 => places_before(GROUP_FIELDS),
+        nth => OF_SIGNALS + nth - 1,
+    }]);
+    i -= 1;
+    fields[i] = Field { name: "gaps", first: OF_GAPS, count: OF_SIGNALS - OF_GAPS, ..further };
     i = 0;
-    while i < fields.len() - 2 {
+    while i < fields.len() - 3 {
         fields[i] = match i.checked_sub(BEFORE.len()) {
             None => BEFORE[i],
             Some(group) => {
@@ -124,7 +134,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUPS.len() + 2] = {
 
 impl Record {
     /// Number of bytes in messages to and from pages.
-    pub const BYTES: usize = 912;
+    pub const BYTES: usize = 1080;
 
     /// Returns the bytes of all fields, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {

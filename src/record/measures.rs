@@ -2,19 +2,22 @@
 
 use super::distance::{apart, farther};
 use super::{Record, valid};
-use rattlemap_dynamics::model::{MOST_COORDINATES, MOST_GAPS, State};
+use rattlemap_dynamics::model::{MOST_COORDINATES, MOST_GAPS, MOST_SIGNALS, State};
 use rattlemap_dynamics::orbit::{
-    DISPLACEMENTS, Measurement, Orbit, Quantities, place_of_displacement, place_of_gap,
+    Measurement, Orbit, Quantities, place_of_displacement, place_of_gap, place_of_signal,
 };
 
 /// Number of numbers in [`Record::measures`].
-pub const MEASURES: usize = OF_GAPS + MOST_GAPS * GAP_GROUPS.len();
+pub const MEASURES: usize = OF_SIGNALS + MOST_SIGNALS * numbers_before(GROUPS.len());
 
 /// First of the numbers of further displacements and gaps in [`Record::measures`].
 pub(crate) const FURTHER: usize = places_before(GROUPS.len());
 
 /// First of the numbers of each gap in [`Record::measures`], which only models with several gaps have.
 pub(crate) const OF_GAPS: usize = FURTHER + FURTHER_DISPLACEMENTS * numbers_before(GROUPS.len());
+
+/// First of the numbers of each signal in [`Record::measures`].
+pub(crate) const OF_SIGNALS: usize = OF_GAPS + MOST_GAPS * GAP_GROUPS.len();
 
 /// Numbers of each gap of a model with several gaps. They have the validity bits of the quantities for all gaps together, and are NaN if
 /// a gap does not have the number.
@@ -34,7 +37,7 @@ pub(crate) const GAP_GROUPS: [Group; 5] = [
 
 /// Quantities that a scene requests by one name, in the order of their places in a record.
 #[rustfmt::skip]
-pub const GROUPS: [Group; 12] = [
+pub const GROUPS: [Group; 13] = [
     group("impact_speed", 9, false, &[number("impact_speed", "mean approach speed of impacts", Dimension::Speed,
         |of, _| of.impacts()?.approaches.get(2).map(|both| both.mean))]),
     group("impact_speed_max", 10, false, &[number("impact_speed_max", "largest approach speed of impacts", Dimension::Speed,
@@ -63,6 +66,8 @@ pub const GROUPS: [Group; 12] = [
         |of, _| Some(of.quantities?.friction?.sticking))]),
     group("friction_energy", 20, false, &[number("friction_energy", "energy that dry friction takes per unit time", Dimension::Power,
         |of, _| Some(of.quantities?.friction?.dissipated))]),
+    group("release_energy", 22, false, &[number("release_energy", "energy that walls with `pull = false` still hold when contact ends, per unit time",
+        Dimension::Power, |of, _| of.quantities?.release_energy)]),
 ];
 
 /// Physical dimension of a number, from which its unit follows.
@@ -157,13 +162,14 @@ const fn numbers_before(group: usize) -> usize {
 /// Number of displacements and gaps with places in their group: the first two displacements and the first gap. The numbers of all others
 /// follow behind those of all groups.
 const FIRST_DISPLACEMENTS: usize = 3;
-const FURTHER_DISPLACEMENTS: usize = DISPLACEMENTS - FIRST_DISPLACEMENTS;
+const FURTHER_DISPLACEMENTS: usize = MOST_COORDINATES + MOST_GAPS - FIRST_DISPLACEMENTS;
 
-/// A displacement or a gap.
+/// A displacement, a gap or a signal.
 #[derive(Clone, Copy, Debug)]
 enum Subject {
     Displacement(usize),
     Gap(usize),
+    Signal(usize),
     /// A gap whose contacts are counted apart.
     OneOfSeveral(usize),
 }
@@ -171,7 +177,8 @@ enum Subject {
 impl Subject {
     /// Returns all, in the order of columns in tables.
     fn all() -> impl Iterator<Item = Subject> {
-        (0..MOST_COORDINATES).map(Subject::Displacement).chain((0..MOST_GAPS).map(Subject::Gap))
+        let displacements = (0..MOST_COORDINATES).map(Subject::Displacement);
+        displacements.chain((0..MOST_GAPS).map(Subject::Gap)).chain((0..MOST_SIGNALS).map(Subject::Signal))
     }
 
     /// Returns the place in [`Quantities::displacements`], or in [`Quantities::gaps`].
@@ -179,6 +186,7 @@ impl Subject {
         match self {
             Subject::Displacement(i) => place_of_displacement(i),
             Subject::Gap(i) => place_of_gap(i),
+            Subject::Signal(i) => place_of_signal(i),
             Subject::OneOfSeveral(i) => i,
         }
     }
@@ -199,10 +207,19 @@ impl Group {
     /// average of an aperiodic motion the statistical error of its amplitude. Amplitude and phase are compared as a
     /// complex number.
     pub fn distance(&self, a: &Record, b: &Record, share: f64) -> f64 {
-        let places: Vec<usize> = self.measures().map(|measure| measure.place).collect();
-        let sizes = self.measures().filter(|measure| !measure.is_angle()).map(|m| b.measures[m.place].abs());
-        let added = share * sizes.fold(0.0, f64::max);
-        let of_displacement = |places: &[usize]| {
+        let measures: Vec<Measure> = self.measures().collect();
+        let largest = |measures: &[Measure]| {
+            let sizes = measures.iter().filter(|m| !m.is_angle()).map(|m| b.measures[m.place].abs());
+            sizes.fold(0.0, f64::max)
+        };
+        let of_displacements: Vec<Measure> =
+            measures.iter().filter(|measure| measure.signal().is_none()).copied().collect();
+        let size_of_displacements = largest(&of_displacements);
+        let of_subject = |measures: &[Measure]| {
+            // A signal has a unit of its own.
+            let is_signal = measures.iter().any(|measure| measure.signal().is_some());
+            let added = share * if is_signal { largest(measures) } else { size_of_displacements };
+            let places: Vec<usize> = measures.iter().map(|measure| measure.place).collect();
             let [a, b] =
                 [a, b].map(|record| places.iter().map(|&place| record.measures[place]).collect::<Vec<_>>());
             let has_phase = self.numbers.last().is_some_and(|number| number.dimension == Dimension::Angle);
@@ -217,7 +234,7 @@ impl Group {
             let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), b.abs() + added));
             distances.fold(0.0, farther)
         };
-        places.chunks(self.numbers.len()).map(of_displacement).fold(0.0, farther)
+        measures.chunks(self.numbers.len()).map(of_subject).fold(0.0, farther)
     }
 
     /// Returns the numbers of the group.
@@ -246,11 +263,15 @@ pub fn all() -> impl Iterator<Item = Measure> {
             false => vec![None],
         };
         subjects.into_iter().flat_map(move |subject| {
-            let nth = subject.map_or(0, Subject::place);
-            let first = match nth.checked_sub(FIRST_DISPLACEMENTS) {
-                None => places_before(index) + nth * group.numbers.len(),
-                Some(nth) => {
-                    FURTHER + FURTHER_DISPLACEMENTS * numbers_before(index) + nth * group.numbers.len()
+            let numbers = group.numbers.len();
+            let first = match (subject, subject.map_or(0, Subject::place)) {
+                (Some(Subject::Signal(nth)), _) => {
+                    OF_SIGNALS + MOST_SIGNALS * numbers_before(index) + nth * numbers
+                }
+                (_, nth) if nth < FIRST_DISPLACEMENTS => places_before(index) + nth * numbers,
+                (_, nth) => {
+                    let nth = nth - FIRST_DISPLACEMENTS;
+                    FURTHER + FURTHER_DISPLACEMENTS * numbers_before(index) + nth * numbers
                 }
             };
             group.numbers.iter().enumerate().map(move |(i, number)| Measure {
@@ -288,24 +309,52 @@ pub(crate) fn contacts_of_gap(record: &Record, gap: usize) -> Option<[f64; 2]> {
     (record.valid & bits == bits).then(|| [0, 1].map(|number| record.measures[first + number]))
 }
 
+/// Names of what the numbers of a record describe.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Subjects {
+    /// Components of the state: displacement and velocity of each coordinate.
+    pub states: Vec<String>,
+    /// Gaps, if there are several.
+    pub gaps: Vec<String>,
+    /// Signals.
+    pub signals: Vec<String>,
+}
+
+impl Subjects {
+    /// Returns the names of a model with one gap and without signals.
+    pub fn of_states(states: &[&str]) -> Subjects {
+        Subjects { states: states.iter().map(ToString::to_string).collect(), ..Subjects::default() }
+    }
+}
+
 impl Measure {
-    /// Whether a motion with these state components and gaps has the number. There are names of gaps only if there are several.
-    pub fn is_of(&self, state_names: &[&str], gaps: &[String]) -> bool {
-        self.subject(state_names, gaps).is_some()
+    /// Whether a motion with these names has the number.
+    pub fn is_of(&self, names: &Subjects) -> bool {
+        self.subject(names).is_some()
     }
 
-    /// Returns the name of the displacement or gap, or an empty text if the number describes the whole motion; none if the model
-    /// has no such displacement.
-    pub fn subject<'n>(&self, state_names: &[&'n str], gaps: &'n [String]) -> Option<&'n str> {
+    /// Returns the name of the displacement, gap or signal, or an empty text if the number describes the whole motion; none if the model
+    /// has none.
+    pub fn subject<'n>(&self, names: &'n Subjects) -> Option<&'n str> {
+        let found = match self.subject {
+            None => return Some(""),
+            Some(Subject::Gap(0)) if names.gaps.is_empty() => return Some("gap"),
+            Some(Subject::Gap(i) | Subject::OneOfSeveral(i)) => names.gaps.get(i),
+            Some(Subject::Displacement(i)) => names.states.get(2 * i),
+            Some(Subject::Signal(i)) => names.signals.get(i),
+        };
+        found.map(String::as_str)
+    }
+
+    /// Returns the index of the signal that the number describes, if it describes one.
+    pub fn signal(&self) -> Option<usize> {
         match self.subject {
-            None => Some(""),
-            Some(Subject::Gap(0)) if gaps.is_empty() => Some("gap"),
-            Some(Subject::Gap(i) | Subject::OneOfSeveral(i)) => gaps.get(i).map(String::as_str),
-            Some(Subject::Displacement(i)) => state_names.get(2 * i).copied(),
+            Some(Subject::Signal(i)) => Some(i),
+            _ => None,
         }
     }
 
-    /// Returns the index of the displacement that the number describes; none for a gap and for the whole motion.
+    /// Returns the index of the displacement that the number describes; none for a gap, a signal and the whole motion.
     pub fn coordinate(&self) -> Option<usize> {
         match self.subject {
             Some(Subject::Displacement(i)) => Some(i),
@@ -318,9 +367,9 @@ impl Measure {
         matches!(self.subject, Some(Subject::OneOfSeveral(_)))
     }
 
-    /// Returns the name in tables, layers and Python for a model with these state components and gaps.
-    pub fn name(&self, state_names: &[&str], gaps: &[String]) -> String {
-        match self.subject(state_names, gaps) {
+    /// Returns the name in tables, layers and Python for a model with these names.
+    pub fn name(&self, names: &Subjects) -> String {
+        match self.subject(names) {
             Some(subject) if !subject.is_empty() => format!("{}_{subject}", self.number.name),
             _ => self.number.name.to_owned(),
         }
@@ -493,20 +542,23 @@ mod tests {
 
     #[test]
     fn names_contain_those_of_the_models_displacements() {
-        let of = |states: &[&str], gaps: &[String]| -> Vec<String> {
-            let own = |group: &Group| group.measures().filter(|m| m.is_of(states, gaps)).collect::<Vec<_>>();
+        let of = |states: &[&str], gaps: &[&str], signals: &[&str]| -> Vec<String> {
+            let [states, gaps, signals] =
+                [states, gaps, signals].map(|names| names.iter().map(ToString::to_string).collect());
+            let names = Subjects { states, gaps, signals };
+            let own = |group: &Group| group.measures().filter(|m| m.is_of(&names)).collect::<Vec<_>>();
             let groups = ["amplitude", "harmonic", "multiplier"].map(|name| own(Group::named(name).unwrap()));
-            groups.concat().iter().map(|measure| measure.name(states, gaps)).collect()
+            groups.concat().iter().map(|measure| measure.name(&names)).collect()
         };
-        let names = |states: &[&str]| of(states, &[]);
+        let names = |states: &[&str]| of(states, &[], &[]);
         let one = "amplitude_y mean_y amplitude_gap mean_gap harmonic_y harmonic_phase_y harmonic_gap \
                    harmonic_phase_gap multiplier multiplier_argument";
         assert_eq!(names(&["y", "vy"]).join(" "), one);
         assert_eq!(names(&["x1", "v1", "x2", "v2"]).len(), 14);
-        let three = of(&["s", "vs", "x", "vx", "y", "vy"], &["a".to_owned(), "b".to_owned()]);
-        let amplitudes =
-            "amplitude_s mean_s amplitude_x mean_x amplitude_y mean_y amplitude_a mean_a amplitude_b mean_b";
-        assert_eq!(three[..10].join(" "), amplitudes);
+        let three = of(&["s", "vs", "x", "vx", "y", "vy"], &["a", "b"], &["seat"]);
+        let amplitudes = "amplitude_s mean_s amplitude_x mean_x amplitude_y mean_y amplitude_a mean_a amplitude_b mean_b \
+                          amplitude_seat mean_seat";
+        assert_eq!(three[..12].join(" "), amplitudes);
     }
 
     #[test]
@@ -559,7 +611,9 @@ mod tests {
 
     #[test]
     fn averages_of_angles_and_of_mirror_images_stay_between_their_values() {
-        let named = |name: &str| all().find(|measure| measure.name(&["x", "v"], &[]) == name).unwrap();
+        let named = |name: &str| {
+            all().find(|measure| measure.name(&Subjects::of_states(&["x", "v"])) == name).unwrap()
+        };
         let phase = named("harmonic_phase_x").average(&[(3.0, 0.75), (-3.0, 0.25)]);
         assert!((phase - (3.0 + 0.25 * (std::f64::consts::TAU - 6.0))).abs() < 1e-12, "{phase}");
         assert_eq!(named("mean_x").average(&[(0.25, 0.75), (-0.25, 0.25)]), 0.25);

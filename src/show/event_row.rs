@@ -33,7 +33,7 @@ pub(crate) struct PlaceNames {
     /// None for a model with one gap.
     gaps: Option<Vec<String>>,
     /// None for a model without friction.
-    elements: Option<Vec<String>>,
+    pub(crate) elements: Option<Vec<String>>,
 }
 
 impl EventRow {

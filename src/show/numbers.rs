@@ -2,8 +2,8 @@
 
 use crate::map::bifurcation::Column;
 use crate::map::scene::Quantity;
-use crate::model_file::several_gaps;
-use crate::record::measures::{self, Dimension, MEASURES, Measure, Measured};
+use crate::model_file::subjects;
+use crate::record::measures::{self, Dimension, MEASURES, Measure, Measured, Subjects};
 use crate::show::cells::{Cells, Row};
 use crate::show::symbols::{symbol, with_unit};
 use rattlemap_dynamics::model::{Model, State, Units};
@@ -44,11 +44,10 @@ impl Number {
     pub fn of(model: &dyn Model, quantities: &[Quantity]) -> Vec<Number> {
         let mut quantities = quantities.to_vec();
         quantities.sort_unstable();
-        let (names, units) = (model.state_names(), model.units());
-        let gaps = several_gaps(model).unwrap_or_default();
+        let (names, units) = (subjects(model), model.units());
         // Numbers of each gap come last, because scripts may know the columns by their places.
-        let whole = quantities.iter().flat_map(|&quantity| of_quantity(quantity, &names, &gaps));
-        let each = quantities.iter().flat_map(|&quantity| of_gaps(quantity, &names, &gaps));
+        let whole = quantities.iter().flat_map(|&quantity| of_quantity(quantity, &names));
+        let each = quantities.iter().flat_map(|&quantity| of_gaps(quantity, &names));
         let mut numbers: Vec<Number> = whole.chain(each).collect();
         for number in &mut numbers {
             number.unit = unit(number, &units);
@@ -100,7 +99,12 @@ impl Number {
 
 /// Returns the unit of a number.
 fn unit(number: &Number, units: &Units) -> Option<String> {
+    let signal = match number.source {
+        Source::Measure(measure) => measure.signal(),
+        _ => None,
+    };
     match (number.dimension, number.component) {
+        (Dimension::Length, None) if signal.is_some() => units.signals.get(signal?)?.clone(),
         (Dimension::Length | Dimension::Speed, Some(component)) => units.component(component),
         (Dimension::Length, None) => units.gap.clone(),
         (Dimension::Speed, None) => units.gap_velocity(),
@@ -112,7 +116,7 @@ fn unit(number: &Number, units: &Units) -> Option<String> {
     }
 }
 
-fn of_quantity(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Number> {
+fn of_quantity(quantity: Quantity, names: &Subjects) -> Vec<Number> {
     match quantity {
         Quantity::ImpactRate => vec![Number {
             name: "impact_rate".to_owned(),
@@ -126,36 +130,36 @@ fn of_quantity(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Numb
             source: Source::ImpactRate,
         }],
         Quantity::State => {
-            let of = |(i, &name): (usize, &&str)| Number {
+            let of = |(i, name): (usize, &String)| Number {
                 name: format!("state_{name}"),
                 title: format!("final state, {name}"),
                 label: format!("final state, {}", symbol(name)),
-                subject: name.to_owned(),
+                subject: name.clone(),
                 dimension: if i % 2 == 0 { Dimension::Length } else { Dimension::Speed },
                 unit: None,
                 quantity,
                 component: Some(i),
                 source: Source::State(i),
             };
-            states.iter().enumerate().map(of).collect()
+            names.states.iter().enumerate().map(of).collect()
         }
         _ => {
             let all = quantity.group().into_iter().flat_map(|group| group.measures());
-            all.filter_map(|measure| of_measure(measure, quantity, states, gaps)).collect()
+            all.filter_map(|measure| of_measure(measure, quantity, names)).collect()
         }
     }
 }
 
 /// Returns the numbers of each of several gaps. One gap has the numbers of the whole motion.
-fn of_gaps(quantity: Quantity, states: &[&str], gaps: &[String]) -> Vec<Number> {
-    let own = measures::of_gaps().filter(|m| !gaps.is_empty() && m.group.name == quantity.name());
-    own.filter_map(|measure| of_measure(measure, quantity, states, gaps)).collect()
+fn of_gaps(quantity: Quantity, names: &Subjects) -> Vec<Number> {
+    let own = measures::of_gaps().filter(|m| !names.gaps.is_empty() && m.group.name == quantity.name());
+    own.filter_map(|measure| of_measure(measure, quantity, names)).collect()
 }
 
-fn of_measure(measure: Measure, quantity: Quantity, states: &[&str], gaps: &[String]) -> Option<Number> {
-    let subject = measure.subject(states, gaps)?;
+fn of_measure(measure: Measure, quantity: Quantity, names: &Subjects) -> Option<Number> {
+    let subject = measure.subject(names)?;
     Some(Number {
-        name: measure.name(states, gaps),
+        name: measure.name(names),
         title: measure.title(subject),
         label: measure.title(&symbol(subject)),
         subject: [measure.part(), subject].join(" ").trim().to_owned(),

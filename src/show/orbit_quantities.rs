@@ -43,6 +43,7 @@ const LINES: [(&str, &[(Quantity, &str)]); 9] = [
             (Quantity::ImpactRate, "impacts"),
             (Quantity::ImpactEnergy, "energy of impacts"),
             (Quantity::Dissipated, "energy of dampers"),
+            (Quantity::ReleaseEnergy, "energy released by walls"),
         ],
     ),
     (

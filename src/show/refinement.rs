@@ -5,16 +5,15 @@ use std::iter;
 use serde_json::{Value, json};
 
 use crate::map::schedule::{Audit, Deviation, Errors, Refined};
-use crate::model_file::several_gaps;
-use crate::record::measures;
+use crate::model_file::subjects;
+use crate::record::measures::{self, Subjects};
 use crate::show::cells::Cells;
 
 /// Returns the numbers of integrated and filled cells of an adaptive map, and the audits of the filled ones; none for other maps.
 pub fn object(cells: &Cells<'_>) -> Option<Value> {
-    let model = cells.scene().base();
-    let names = (&model.state_names()[..], &several_gaps(model).unwrap_or_default()[..]);
+    let names = subjects(cells.scene().base());
     let Refined { integrated, filled, rounds, ref audits, .. } = *cells.refinement()?;
-    let audits: Vec<Value> = audits.iter().map(|one| audit(one, names)).collect();
+    let audits: Vec<Value> = audits.iter().map(|one| audit(one, &names)).collect();
     Some(json!({ "integrated": integrated, "filled": filled, "rounds": rounds, "audits": audits }))
 }
 
@@ -22,7 +21,7 @@ pub fn object(cells: &Cells<'_>) -> Option<Value> {
 /// interval (Wilson). `words` counts sampled cells that had been filled with a word, `wrong_words` those whose word was wrong;
 /// `patterns` and `wrong_patterns` count patterns. `errors` are null where filled cells have no such value; measured quantities
 /// have an entry if the scene requests them.
-fn audit(audit: &Audit, (state_names, gaps): (&[&str], &[String])) -> Value {
+fn audit(audit: &Audit, names: &Subjects) -> Value {
     let mut object = json!({
         "filled": audit.filled,
         "sampled": audit.sampled,
@@ -39,9 +38,9 @@ fn audit(audit: &Audit, (state_names, gaps): (&[&str], &[String])) -> Value {
             "mesh_fraction": audit.errors.mesh.map(|deviation| deviations(deviation, false)),
         },
     });
-    for measure in measures::all().filter(|measure| measure.is_of(state_names, gaps)) {
+    for measure in measures::all().filter(|measure| measure.is_of(names)) {
         if let Some(deviation) = audit.errors.measures[measure.place] {
-            object["errors"][measure.name(state_names, gaps)] = deviations(deviation, false);
+            object["errors"][measure.name(names)] = deviations(deviation, false);
         }
     }
     object
@@ -98,14 +97,13 @@ pub fn lines(cells: &Cells<'_>) -> Vec<String> {
         )
     });
     let first = format!("{share:.1} % of {count} cells integrated, the others filled{audit}");
-    let model = cells.scene().base();
-    let names = (&model.state_names()[..], &several_gaps(model).unwrap_or_default()[..]);
-    let errors = refined.audits.last().into_iter().flat_map(|audit| errors(&audit.errors, names));
+    let names = subjects(cells.scene().base());
+    let errors = refined.audits.last().into_iter().flat_map(|audit| errors(&audit.errors, &names));
     iter::once(first).chain(errors).collect()
 }
 
 /// One line per quantity: how far filled values differ from integrated ones.
-fn errors(errors: &Errors, (state_names, gaps): (&[&str], &[String])) -> Vec<String> {
+fn errors(errors: &Errors, names: &Subjects) -> Vec<String> {
     let line = |name: &str, deviation: Option<Deviation>, share: fn(&Deviation) -> String| {
         let deviation = deviation?;
         let Deviation { compared, empty, median, p95, worst, .. } = deviation;
@@ -128,9 +126,8 @@ fn errors(errors: &Errors, (state_names, gaps): (&[&str], &[String])) -> Vec<Str
         line("impacts per period", errors.impacts, off_by_one),
         line("mesh fraction", errors.mesh, |_| String::new()),
     ];
-    let measures = measures::all().filter(|measure| measure.is_of(state_names, gaps));
-    let measured = measures.map(|measure| {
-        line(&measure.name(state_names, gaps), errors.measures[measure.place], |_| String::new())
-    });
+    let measures = measures::all().filter(|measure| measure.is_of(names));
+    let measured =
+        measures.map(|measure| line(&measure.name(names), errors.measures[measure.place], |_| String::new()));
     first.into_iter().chain(measured).flatten().collect()
 }

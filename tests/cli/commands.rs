@@ -436,7 +436,7 @@ fn advice_names_what_would_be_right() {
         ("models m.toml", "(a power is `^`, not `**`)"),
         (
             "bifurcation s.toml --set outputs.quantities=[\"energy\"]",
-            "did you mean `impact_energy` or `friction_energy`?",
+            "did you mean `impact_energy` or `friction_energy` or `release_energy`?",
         ),
     ] {
         run(&folder, line).code(2).stderr(says(&[advice]));

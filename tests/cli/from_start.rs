@@ -178,7 +178,7 @@ fn reversals_and_sticking_are_events() {
         assert!((t - n as f64 * PI / 100.0).abs() < 1e-12 && (r - exact).abs() < 1e-15, "{row:?}");
     }
     let (header, moments) = rows(&folder.path().join("o/trajectory.csv"));
-    assert!(header.ends_with("event,side,moment,element"), "{header}");
+    assert!(header.ends_with("event,side,moment,element,contact_force,friction_force"), "{header}");
     let sticks: Vec<_> = moments.iter().filter(|row| row.contains(&"stick".to_owned())).collect();
     assert_eq!(sticks.len(), 2, "before and after");
     let figure = fs::read_to_string(folder.path().join("o/history.svg")).unwrap();

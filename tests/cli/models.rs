@@ -220,7 +220,7 @@ fn a_model_from_a_file_has_maps_basins_diagrams_and_orbits() {
     assert_eq!(orbit["strobe"].as_array().unwrap().len(), 2);
     assert_eq!(orbit["events"][0]["before"].as_array().unwrap().len(), 2);
     let table = fs::read_to_string(at("out/motion/trajectory.csv")).unwrap();
-    assert!(table.starts_with("t,phase,z,w,x,v,domain,event,side,moment\n"), "{table}");
+    assert!(table.starts_with("t,phase,z,w,x,v,domain,event,side,moment,contact_force\n"), "{table}");
     assert_eq!(json(&at("out/motion/manifest.json"))["model"]["text"], toml(0));
 
     // A changed model cannot be resumed.
@@ -299,7 +299,7 @@ fn dry_friction_is_printed() {
 #[test]
 fn several_gaps_and_restitution_by_speed_are_printed() {
     let folder = empty();
-    fs::write(folder.path().join("my-driveline.toml"), toml(9)).unwrap();
+    fs::write(folder.path().join("my-driveline.toml"), toml(10)).unwrap();
     let page = stdout(&folder, "models my-driveline.toml");
     for part in [
         "gap   mesh = x1 - x2\n    rate  mesh' = v1 - v2\n    gap   shaft = x2 - x3\n",

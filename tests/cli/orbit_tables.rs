@@ -94,7 +94,10 @@ fn tables_have_the_names_of_all_coordinates_and_gaps() {
     run(&folder, "bifurcation line.toml --quiet").code(0);
     let table = |name: &str| rows(&folder.path().join(name));
     let (header, moments) = table("o/trajectory.csv");
-    assert_eq!(header, "t,phase,a,a_rate,b,b_rate,s,vs,x1,v1,x2,v2,domain_a,domain_b,event,side,moment,gap");
+    assert_eq!(
+        header,
+        "t,phase,a,a_rate,b,b_rate,s,vs,x1,v1,x2,v2,domain_a,domain_b,event,side,moment,gap,contact_force_a,contact_force_b"
+    );
     let mut seen = [[0; 2]; 2];
     for row in &moments {
         let number = |i: usize| row[i].parse::<f64>().unwrap();

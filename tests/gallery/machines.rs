@@ -489,6 +489,7 @@ fn row_of_three(phase: f64) -> Oscillator {
         ],
         gaps: vec![gap([1.0, -1.0, 0.0], 0.3), gap([0.0, 1.0, -1.0], 0.5)],
         friction: Vec::new(),
+        signals: Vec::new(),
     }
 }
 
@@ -591,6 +592,7 @@ fn dropped(restitution: Restitution) -> Oscillator {
         drives: Vec::new(),
         gaps: vec![GapRow { row: DVector::from_element(1, 1.0), walls: [Vec::new(), vec![wall]] }],
         friction: Vec::new(),
+        signals: Vec::new(),
     }
 }
 

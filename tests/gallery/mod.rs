@@ -18,4 +18,5 @@ mod meissner;
 mod models;
 mod pieces;
 mod random;
+mod signals;
 mod single_impact;

@@ -85,7 +85,10 @@ fn an_impact_at_phase_0_does_not_change_cells_of_lanes() {
         let records = gpu::map(&plan, &mut gpu::open(precision));
         check(&records, within);
         let phase = rattlemap::record::measures::all()
-            .find(|measure| measure.name(&["x", "v"], &[]) == "harmonic_phase_x")
+            .find(|measure| {
+                measure.name(&rattlemap::record::measures::Subjects::of_states(&["x", "v"]))
+                    == "harmonic_phase_x"
+            })
             .unwrap();
         for id in (0..records.len()).filter(|&id| exists(case(id))) {
             let [ours, right] = [&records[id], &reference[id]].map(|record| phase.of(record).unwrap());

@@ -163,7 +163,7 @@ fn averages_near_a_cycle_may_be_off_by_the_distance() {
                 values = [5.142857142857143, 5.15]\n[outputs]\nquantities = ['class', 'lyapunov', 'amplitude']\n";
     let plan = Plan::new(&Scene::parse(text, "test", &[], Purpose::Map).unwrap());
     let mean = measures::all()
-        .find(|measure| measure.name(&["x1", "v1", "x2", "v2"], &[]) == "mean_gap")
+        .find(|measure| measure.name(&measures::Subjects::of_states(&["x1", "v1", "x2", "v2"])) == "mean_gap")
         .unwrap()
         .place;
     let found = |distance: f64, off: f64| {

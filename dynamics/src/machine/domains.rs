@@ -44,7 +44,10 @@ impl System {
 
     /// Returns the domain of a combination of modes, and builds it on first use.
     pub(super) fn domain(&self, modes: &Modes) -> &LinearDomain {
-        let key = modes.key(self);
+        self.domain_at(modes.key(self))
+    }
+
+    pub(super) fn domain_at(&self, key: DomainKey) -> &LinearDomain {
         let mut place = &self.domains[key.stage];
         loop {
             let build = || Box::new(Met { key, domain: LinearDomain::new(self, key), next: OnceLock::new() });

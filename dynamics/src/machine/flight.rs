@@ -1,12 +1,14 @@
 //! Integrals and extremes over a flight of a machine.
 
+use nalgebra::DVector;
+
 use super::PhasePoint;
-use super::domain::{Functional, LinearDomain, Path};
+use super::domain::{DomainKey, Functional, LinearDomain, Path};
 use super::frame::{Element, Frame};
 use super::modes::Modes;
-use crate::model::Side;
+use crate::model::{Side, Signal};
 use crate::motion::Slip;
-use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, root};
+use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, place_of_signal, root};
 
 /// Part of a flight: one domain, at most one Taylor step.
 pub(super) struct Flight<'a> {
@@ -22,12 +24,12 @@ pub(super) struct Flight<'a> {
 }
 
 /// A linear function of the motion, and its rate.
-struct Signal {
+struct Measured {
     value: Functional,
     rate: Functional,
 }
 
-impl Signal {
+impl Measured {
     fn at(&self, point: &PhasePoint) -> f64 {
         self.value.dot(point)
     }
@@ -63,7 +65,7 @@ impl Flight<'_> {
                 sums.sticking_time += weight;
             }
             let (start, from) = before.unwrap_or_else(|| (0.0, self.at(0.0)));
-            let include = |moments: &mut Moments, signal: &Signal| {
+            let include = |moments: &mut Moments, signal: &Measured| {
                 moments.include(signal.at(&from));
                 moments.include(signal.at(&point));
                 if signal.rate(&from) * signal.rate(&point) < 0.0 {
@@ -90,35 +92,26 @@ impl Flight<'_> {
         self.domain.point(self.path, self.share * share)
     }
 
-    fn signal(&self, value: Functional) -> Signal {
-        Signal { rate: self.domain.rate_of(&value), value }
+    fn signal(&self, value: Functional) -> Measured {
+        Measured { rate: self.domain.rate_of(&value), value }
     }
 
-    /// Returns all displacements and gaps, by their places in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
-    fn displacements(&self) -> Vec<(usize, Signal)> {
+    /// Returns all displacements, gaps and signals, by their places in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
+    fn displacements(&self) -> Vec<(usize, Measured)> {
         let displacements = (0..self.system.machine().degrees())
             .map(|i| (place_of_displacement(i), self.system.displacement_row(i)));
         let gaps = (0..self.system.gaps()).map(|gap| (place_of_gap(gap), self.domain.unit_row(gap)));
-        displacements.chain(gaps).map(|(place, row)| (place, self.signal(row))).collect()
+        let signals = self.system.machine.signals.iter().enumerate();
+        let signals = signals.map(|(i, own)| (place_of_signal(i), self.system.signal_row(own, self.domain)));
+        let all = displacements.chain(gaps).chain(signals);
+        all.map(|(place, row)| (place, self.signal(row))).collect()
     }
 
     /// Returns the gaps with compliant contact and its force, positive where it pushes.
-    fn contact_forces(&self) -> Vec<(usize, Signal)> {
+    fn contact_forces(&self) -> Vec<(usize, Measured)> {
         let key = self.modes.key(self.system);
         let engaged = (0..self.system.gaps()).filter(|&gap| key.engaged[gap] != 0);
-        engaged
-            .map(|gap| {
-                let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
-                let (sign, mut row) = (side.sign(), Functional::ZERO);
-                for wall in &self.system.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
-                    let spring = wall.springs[self.modes.stage];
-                    row.0[gap] += sign * spring.stiffness;
-                    row.0[self.system.n + gap] += sign * spring.damping;
-                    row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.system.width());
-                }
-                (gap, self.signal(row))
-            })
-            .collect()
+        engaged.map(|gap| (gap, self.signal(self.system.compliant_force(&key, gap)))).collect()
     }
 
     /// Returns the power that all dampers dissipate at a point.
@@ -150,6 +143,36 @@ impl Frame {
             (0..self.n).for_each(|j| row[j] = self.from_flow[(i, j)]);
         }
         Functional(row)
+    }
+
+    /// Returns the row of a signal in a domain.
+    pub(super) fn signal_row(&self, signal: &Signal, domain: &LinearDomain) -> Functional {
+        let (n, mut row) = (self.n, Functional::ZERO);
+        let factors = |own: &DVector<f64>| self.from_flow.transpose() * own;
+        row.0[..n].copy_from_slice(factors(&signal.displacement).as_slice());
+        row.0[n..2 * n].copy_from_slice(factors(&signal.velocity).as_slice());
+        for (factor, acceleration) in factors(&signal.acceleration).iter().zip(&domain.accelerations) {
+            row.0.iter_mut().zip(acceleration.0).for_each(|(row, x)| *row += factor * x);
+        }
+        if signal.waves != [0.0; 2] {
+            // The first harmonic comes first.
+            row.0[2 * n] += signal.waves[0];
+            row.0[2 * n + 1] += signal.waves[1];
+        }
+        row.plus(signal.constant, self.width())
+    }
+
+    /// Returns the row of the force of a gap's compliant contacts, positive where it pushes.
+    pub(super) fn compliant_force(&self, key: &DomainKey, gap: usize) -> Functional {
+        let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
+        let (sign, mut row) = (side.sign(), Functional::ZERO);
+        for wall in &self.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
+            let spring = wall.springs[key.stage];
+            row.0[gap] += sign * spring.stiffness;
+            row.0[self.n + gap] += sign * spring.damping;
+            row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width());
+        }
+        row
     }
 
     /// Returns the part of the energy that events change: kinetic energy, and the energy of springs and preloads of contacts.

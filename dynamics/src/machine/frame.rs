@@ -13,9 +13,10 @@ pub(super) struct StageForces {
     pub(super) load: DVector<f64>,
 }
 
-/// An element with dry friction: factors of `w` in the sliding rate, force and speed.
+/// An element with dry friction: its place in the model, factors of `w` in the sliding rate, force and speed.
 #[derive(Clone, Debug)]
 pub(super) struct Element {
+    pub(super) index: usize,
     pub(super) row: DVector<f64>,
     pub(super) force: f64,
     pub(super) speed: f64,
@@ -83,14 +84,14 @@ impl Frame {
                 load: &back * &forces.load,
             })
             .collect();
-        let with_force = machine.friction.iter().filter(|friction| friction.force > 0.0);
+        let with_force = machine.friction.iter().enumerate().filter(|(_, friction)| friction.force > 0.0);
         let elements = with_force
-            .map(|friction| {
+            .map(|(index, friction)| {
                 let row = &back * &friction.row;
                 // Entries that are zero without rounding are set to zero, so that a row along a gap has no other entries.
                 let least = ROUNDING * row.amax();
                 let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
-                Element { row, force: friction.force, speed: friction.speed }
+                Element { index, row, force: friction.force, speed: friction.speed }
             })
             .collect();
         let period = machine.period();

@@ -340,9 +340,13 @@ impl<'s> MachineMotion<'s> {
         self.act(watch, observer);
         if let (Some(before), Some(sums)) = (before, observer.sums()) {
             let lost = before - energy(self);
-            sums.lost += lost;
-            if let Some(gap) = watch.gap() {
-                sums.gaps[gap].lost += lost;
+            if let Watch::ForceEnds(..) | Watch::ForceBegins(..) = watch {
+                sums.released += lost;
+            } else {
+                sums.lost += lost;
+                if let Some(gap) = watch.gap() {
+                    sums.gaps[gap].lost += lost;
+                }
             }
         }
         if let Some((row, field)) = linearised {

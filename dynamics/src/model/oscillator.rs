@@ -48,6 +48,9 @@ pub const MOST_COORDINATES: usize = 8;
 /// Largest number of gaps.
 pub const MOST_GAPS: usize = 3;
 
+/// Largest number of signals.
+pub const MOST_SIGNALS: usize = 4;
+
 /// Linear forces that act always, in one stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forces {
@@ -162,6 +165,22 @@ pub struct DryFriction {
     pub speed: f64,
 }
 
+/// A linear function of the motion that is measured, such as the acceleration of a seat on a moving support:
+/// `displacement . x + velocity . x' + acceleration . x'' + constant + cos cos(omega t) + sin sin(omega t)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Signal {
+    /// Factors of the displacements.
+    pub displacement: DVector<f64>,
+    /// Factors of the velocities.
+    pub velocity: DVector<f64>,
+    /// Factors of the accelerations.
+    pub acceleration: DVector<f64>,
+    /// Constant part.
+    pub constant: f64,
+    /// Factors of the cosine and the sine of the forcing phase. If one is not 0, the force needs a first harmonic, which may be 0.
+    pub waves: [f64; 2],
+}
+
 /// A forced piecewise-linear oscillator. All vectors have one entry per coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
@@ -180,6 +199,8 @@ pub struct Oscillator {
     pub gaps: Vec<GapRow>,
     /// Elements with dry friction, up to [`MOST_FRICTION`].
     pub friction: Vec<DryFriction>,
+    /// Signals, up to [`MOST_SIGNALS`].
+    pub signals: Vec<Signal>,
 }
 
 /// Checks that all entries of a vector or matrix are finite.
@@ -204,6 +225,7 @@ impl Oscillator {
             (self.degrees() > 2, "more than two coordinates"),
             (self.gaps.len() > 1, "several gaps"),
             (!self.friction.is_empty(), "dry friction"),
+            (!self.signals.is_empty(), "signals"),
             (
                 walls.any(|wall| matches!(wall.restitution, Restitution::BySpeed { .. })),
                 "restitution that depends on the approach speed",
@@ -251,8 +273,17 @@ impl Oscillator {
             let turn = first.powu(*order);
             Drive { order: *order, cos: cos * turn.re + sin * turn.im, sin: sin * turn.re - cos * turn.im }
         };
-        let drives = self.drives.iter().map(drive).collect();
-        Oscillator { drives, schedule: schedule_at(&self.schedule, phase), ..self.clone() }
+        let signal = |signal: &Signal| {
+            let [cos, sin] = signal.waves;
+            let waves = [cos * first.re + sin * first.im, sin * first.re - cos * first.im];
+            Signal { waves, ..signal.clone() }
+        };
+        Oscillator {
+            drives: self.drives.iter().map(drive).collect(),
+            signals: self.signals.iter().map(signal).collect(),
+            schedule: schedule_at(&self.schedule, phase),
+            ..self.clone()
+        }
     }
 
     /// Returns the [`schedule`](Self::schedule) of stages that begin at these phases, in order, and recur `repeat` times in a forcing
@@ -362,7 +393,7 @@ impl Oscillator {
     }
 
     /// Whether `(y, t) -> (-y, t + T/2)` maps motions to motions: the walls of each gap are mirror images with equal laws, the force has odd
-    /// harmonics only, no surface moves, and the stages recur, mirrored, after half a period.
+    /// harmonics only, no surface moves, no signal has a constant part, and the stages recur, mirrored, after half a period.
     pub fn mirror_symmetric(&self) -> bool {
         let pairs = || self.gaps.iter().flat_map(|gap| gap.walls[0].iter().zip(&gap.walls[1]));
         let is_alike = |(right, left): (&Wall, &Wall)| {
@@ -383,6 +414,7 @@ impl Oscillator {
             && pairs().all(is_alike)
             && self.drives.iter().all(|drive| drive.order % 2 == 1)
             && self.friction.iter().all(|friction| friction.speed == 0.0)
+            && self.signals.iter().all(|signal| signal.constant == 0.0)
             && recurs_after_half_a_period(&self.schedule, is_mirrored)
     }
 
@@ -448,6 +480,18 @@ impl Oscillator {
             require(is_known, || "order of a harmonic".to_owned(), f64::from(*order), "1 to 64")?;
             all_finite(|| format!("cosine of harmonic {order}"), cos)?;
             all_finite(|| format!("sine of harmonic {order}"), sin)?;
+        }
+        let count = self.signals.len();
+        require(count <= MOST_SIGNALS, || "the number of signals".to_owned(), count as f64, "at most 4")?;
+        let has_first = self.drives.first().is_some_and(|drive| drive.order == 1);
+        for (i, signal) in (1..).zip(&self.signals) {
+            let rows = [&signal.displacement, &signal.velocity, &signal.acceleration];
+            let rows = rows.into_iter().flat_map(DVector::iter);
+            let all = rows.chain(&signal.waves).chain([&signal.constant]);
+            all_finite(|| format!("entry of signal {i}"), all)?;
+            let needs_first = signal.waves != [0.0; 2];
+            let range = "that of a signal without cosine and sine, unless the force has a first harmonic";
+            require(!needs_first || has_first, || format!("cosine of signal {i}"), signal.waves[0], range)?;
         }
         for (i, gap) in self.gaps.iter().enumerate() {
             let of_gap = match self.gaps.len() {

@@ -247,10 +247,19 @@ impl Pair {
         self.outer_walls.iter().any(|walls| !walls.is_empty())
     }
 
+    /// Whether the last wall of a side only pushes.
+    fn is_pushing(&self, side: Side) -> bool {
+        self.last_wall(side).1 == Contact::Pushing && self.wall(side).is_finite()
+    }
+
+    /// Whether the last wall of any side only pushes.
+    pub fn has_pushing_walls(&self) -> bool {
+        Side::BOTH.into_iter().any(|side| self.is_pushing(side))
+    }
+
     /// Whether the last wall of a side only pushes, or any of its walls has a preload in any stage.
     pub fn is_pushing_or_preloaded(&self, side: Side) -> bool {
-        self.last_wall(side).1 == Contact::Pushing && self.wall(side).is_finite()
-            || self.preloads(side).any(|preload| preload != 0.0)
+        self.is_pushing(side) || self.preloads(side).any(|preload| preload != 0.0)
     }
 
     /// Returns the preloads of the walls of a side, in all stages.

@@ -157,6 +157,8 @@ pub struct Units {
     pub time: Option<String>,
     /// Unit of contact forces.
     pub force: Option<String>,
+    /// Unit of each signal.
+    pub signals: Vec<Option<String>>,
 }
 
 impl Units {

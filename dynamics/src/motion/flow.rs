@@ -1,7 +1,9 @@
 //! An oscillator, prepared for its motions.
 
 use crate::machine::System;
-use crate::model::{Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, State, first_four, state};
+use crate::model::{
+    Contact, Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, State, first_four, state,
+};
 use crate::pair::PairFlow;
 use crate::pair::flow::power_of_two;
 
@@ -142,6 +144,17 @@ impl Flow {
         match &self.engine {
             Engine::Pair(_) => false,
             Engine::Machine(system) => system.has_friction(),
+        }
+    }
+
+    /// Whether a wall only pushes.
+    pub fn has_pushing_walls(&self) -> bool {
+        match &self.engine {
+            Engine::Pair(flow) => flow.oscillator.has_pushing_walls(),
+            Engine::Machine(system) => {
+                let mut walls = system.machine().gaps.iter().flat_map(|gap| gap.walls.iter().flatten());
+                walls.any(|wall| wall.contact == Contact::Pushing)
+            }
         }
     }
 

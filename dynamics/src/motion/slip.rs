@@ -31,7 +31,7 @@ impl Slip {
     }
 
     /// Returns the direction of a rate that is not 0.
-    pub(crate) fn of(rate: f64) -> Slip {
+    pub fn of(rate: f64) -> Slip {
         if rate > 0.0 { Slip::Forward } else { Slip::Backward }
     }
 }

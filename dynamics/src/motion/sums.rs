@@ -3,7 +3,7 @@
 //! A flight is measured by Gauss-Legendre quadrature of order 16 over pieces of at most one Taylor step, where its error is below rounding,
 //! and extremes are found at the zeros of the rate.
 
-use crate::model::{MOST_COORDINATES, MOST_GAPS, Side};
+use crate::model::{MOST_COORDINATES, MOST_GAPS, MOST_SIGNALS, Side};
 
 /// Nodes in `(0, 1)` and weights of the Gauss-Legendre quadrature on `[-1, 1]`; the other half is symmetric.
 const GAUSS: [(f64, f64); 4] = [
@@ -16,8 +16,8 @@ const GAUSS: [(f64, f64); 4] = [
 /// Largest number of iterations that locate an extreme.
 const EXTREME_ITERATIONS: usize = 60;
 
-/// Largest number of displacements and gaps.
-pub const DISPLACEMENTS: usize = MOST_COORDINATES + MOST_GAPS;
+/// Largest number of displacements, gaps and signals.
+pub const DISPLACEMENTS: usize = MOST_COORDINATES + MOST_GAPS + MOST_SIGNALS;
 
 /// Returns the place of a displacement in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
 pub fn place_of_displacement(i: usize) -> usize {
@@ -27,6 +27,11 @@ pub fn place_of_displacement(i: usize) -> usize {
 /// Returns the place of a gap in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
 pub fn place_of_gap(i: usize) -> usize {
     if i == 0 { 2 } else { MOST_COORDINATES + i }
+}
+
+/// Returns the place of a signal in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
+pub fn place_of_signal(i: usize) -> usize {
+    MOST_COORDINATES + MOST_GAPS + i
 }
 
 /// Approach speeds so far.
@@ -101,9 +106,11 @@ pub struct Sums {
     pub(crate) contacts: [Contacts; 2],
     /// Energy lost in impacts and in springs of contacts that end.
     pub(crate) lost: f64,
+    /// Energy in springs and preloads of walls that only push, where their contact ends, without that where it begins.
+    pub(crate) released: f64,
     /// Energy that dampers dissipate.
     pub(crate) dissipated: f64,
-    /// Displacements and gaps, by their places.
+    /// Displacements, gaps and signals, by their places.
     pub(crate) displacements: [Moments; DISPLACEMENTS],
     /// Forces of compliant contacts, and the time during which they act.
     pub(crate) force: Moments,
@@ -119,6 +126,7 @@ impl Sums {
     pub(crate) const NONE: Sums = Sums {
         contacts: [Contacts { count: 0, sum: 0.0, largest: 0.0 }; 2],
         lost: 0.0,
+        released: 0.0,
         dissipated: 0.0,
         displacements: [Moments::NONE; DISPLACEMENTS],
         force: Moments::NONE,

@@ -16,9 +16,11 @@ pub struct Quantities {
     /// Energy lost in contacts per unit time: `(1 - e^2) w^2 / (2 g M^-1 g)` in each impact, and the energy of a contact
     /// spring that is released before it relaxes.
     pub impact_energy: f64,
+    /// Energy that walls that only push still hold when their contact ends, per unit time; none without such walls.
+    pub release_energy: Option<f64>,
     /// Largest and root mean square force of compliant contacts, positive if it presses; none without such contact.
     pub contact_force: Option<[f64; 2]>,
-    /// The first two displacements, the first gap, the other displacements and the other gaps; unused entries are 0.
+    /// The first two displacements, the first gap, the other displacements, the other gaps and the signals; unused entries are 0.
     pub displacements: [Displacement; DISPLACEMENTS],
     /// Energy that all dampers dissipate per unit time.
     pub dissipated: f64,
@@ -179,6 +181,7 @@ impl<'f> Meter<'f> {
         Quantities {
             approaches: [right, left, right.and(left)].map(Approaches::of),
             impact_energy: sums.lost / time,
+            release_energy: self.flow.has_pushing_walls().then_some(sums.released / time),
             contact_force: (sums.contact_time > 0.0)
                 .then(|| [sums.force.high, (sums.force.square / sums.contact_time).sqrt()]),
             displacements: sums.displacements.map(|moments| Displacement::of(&moments, time)),

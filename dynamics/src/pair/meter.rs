@@ -2,6 +2,7 @@
 //! states.
 
 use super::{DomainKind, Gap, LinearFlow, PairFlow, PairMotion, Phasor, Schedule, side_of};
+use crate::model::Contact;
 use crate::motion::{EventKind, GapEvent, Sums, nodes, root};
 
 /// The present flight of a motion that is measured.
@@ -171,7 +172,10 @@ impl<'f> PairMeter<'f> {
     fn contact(&self, event: &GapEvent, sums: &mut Sums) {
         let (side, flow) = (event.side, self.flow);
         let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
-        if event.kind == EventKind::MeshEnd {
+        if flow.oscillator.contacts[side.index()] == Contact::Pushing {
+            let sign = if event.kind == EventKind::MeshEnd { 1.0 } else { -1.0 };
+            sums.released += sign * self.stored(event);
+        } else if event.kind == EventKind::MeshEnd {
             sums.lost += self.stored(event);
         } else if flow.contacts[side.index()].is_elastic() {
             sums.lost -= self.stored(event);

@@ -183,5 +183,6 @@ pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
             .collect(),
         gaps: vec![GapRow { row: vector(pair.gap), walls: Side::BOTH.map(walls) }],
         friction: Vec::new(),
+        signals: Vec::new(),
     }
 }

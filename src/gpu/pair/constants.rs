@@ -58,6 +58,8 @@ pub struct PairConstants {
     pub(in crate::gpu) changes: Vec<Change>,
     /// Whether contact-free motion also requires that the displacement `x` rests at 0.
     pub(in crate::gpu) must_rest: bool,
+    /// Whether a wall only pushes.
+    pub(in crate::gpu) has_pushing_walls: bool,
     /// Positions of the rigid walls on the right and on the left; infinite on a side without a rigid wall.
     bounds: [f64; 2],
     coordinates: Coordinates,
@@ -106,6 +108,7 @@ impl PairConstants {
             further,
             changes,
             must_rest: false,
+            has_pushing_walls: model.has_pushing_walls(),
             bounds: Side::BOTH.map(|side| match oscillator.last_wall(side) {
                 (at, Contact::Rigid) => at,
                 _ => side.sign() * f64::INFINITY,

@@ -7,7 +7,7 @@ use super::limits::MOST_LINES;
 use super::section::{Field, Section};
 use super::settings::read_title;
 use super::{Points, Quantity};
-use crate::model_file::several_gaps;
+use crate::model_file::{several_gaps, subjects};
 use crate::text::document::Value;
 use crate::text::expression::Expression;
 use rattlemap_dynamics::model::Model;
@@ -179,10 +179,10 @@ pub(super) fn read(
     }
     let mut scales = Vec::new();
     if let Some(field) = section.get("scale") {
-        let states = points.base().state_names();
+        let names = subjects(points.base());
         let fixed = ["lyapunov", "impacts", "mesh"].map(str::to_owned);
         let layers: Vec<String> =
-            quantities.iter().flat_map(|quantity| quantity.columns(&states, &gaps)).chain(fixed).collect();
+            quantities.iter().flat_map(|quantity| quantity.columns(&names)).chain(fixed).collect();
         let known: Vec<&str> = layers.iter().map(String::as_str).collect();
         for (name, field) in Section::open(field.node, &field.path, &known)?.fields() {
             scales.push((name.to_owned(), read_scale(&field)?));

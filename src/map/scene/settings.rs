@@ -7,7 +7,7 @@ use super::keys;
 use super::limits::{LONGEST_TITLE, MAX_PERIODS};
 use super::section::{Field, Section};
 use crate::record::limits::{LONGEST_CYCLE, MOST_STEPS};
-use crate::record::measures::{self, Group};
+use crate::record::measures::{self, Group, Subjects};
 use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit;
 
@@ -167,6 +167,8 @@ named! {
         StickFraction = "stick_fraction",
         /// Energy that dry friction takes per unit time.
         FrictionEnergy = "friction_energy",
+        /// Energy that walls with `pull = false` still hold when contact ends, per unit time.
+        ReleaseEnergy = "release_energy",
         /// Last state at phase 0.
         State = "state",
     }
@@ -207,16 +209,17 @@ impl Quantity {
         Quantity::ALL.into_iter().filter(is_measured).collect()
     }
 
-    /// Returns the names of its columns for a model with these state components and names of several gaps, if it is a measured quantity or the state.
-    pub fn columns(self, state_names: &[&str], gaps: &[String]) -> Vec<String> {
+    /// Returns the names of its columns for a model with these names, if it is a measured quantity or the state.
+    pub fn columns(self, names: &Subjects) -> Vec<String> {
         match self {
             Quantity::ImpactRate => vec![self.name().to_owned()],
-            Quantity::State => state_names.iter().map(|name| format!("state_{name}")).collect(),
+            Quantity::State => names.states.iter().map(|name| format!("state_{name}")).collect(),
             _ => {
                 let measures = self.group().into_iter().flat_map(|group| group.measures());
-                let each = measures::of_gaps().filter(|m| !gaps.is_empty() && m.group.name == self.name());
+                let each =
+                    measures::of_gaps().filter(|m| !names.gaps.is_empty() && m.group.name == self.name());
                 let measures = measures.chain(each);
-                measures.filter(|m| m.is_of(state_names, gaps)).map(|m| m.name(state_names, gaps)).collect()
+                measures.filter(|m| m.is_of(names)).map(|m| m.name(names)).collect()
             }
         }
     }

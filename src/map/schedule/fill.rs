@@ -137,8 +137,11 @@ mod tests {
     #[test]
     fn measured_quantities_are_interpolated_if_all_corners_have_them() {
         let block = Block { i: [0, 4], j: [0, 2] };
-        let [speed, phase] = ["impact_speed", "harmonic_phase_x"]
-            .map(|name| measures::all().find(|measure| measure.name(&["x", "v"], &[]) == name).unwrap());
+        let [speed, phase] = ["impact_speed", "harmonic_phase_x"].map(|name| {
+            measures::all()
+                .find(|measure| measure.name(&measures::Subjects::of_states(&["x", "v"])) == name)
+                .unwrap()
+        });
         let corners = [2.0, 3.0, 2.0, 3.0].map(|value| {
             let mut record = corner(0.0);
             record.valid |= speed.group.bit | phase.group.bit;

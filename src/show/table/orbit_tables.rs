@@ -2,13 +2,18 @@
 
 use std::io::Write;
 
-use crate::model_file::{gap_columns, several_gaps};
+use crate::model_file::{gap_columns, several_gaps, subjects};
+use crate::record::measures::Subjects;
 use crate::show::error::WriteError;
 use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
 use crate::show::names::optional;
 use crate::show::orbit_spectrum::Spectrum;
-use rattlemap_dynamics::model::{Model, ModelError, Side, State};
+use rattlemap_dynamics::machine::{Outputs, Situation, System};
+use rattlemap_dynamics::model::{
+    DryFriction, MOST_FRICTION, Model, ModelError, Oscillator, REST, Side, State,
+};
+use rattlemap_dynamics::motion::{Slip, SlipKind, Slips};
 use rattlemap_dynamics::orbit::{Event, History, SlipPoint, is_reached};
 
 /// A row of the motion: a sample, or the state before or after an event.
@@ -24,6 +29,8 @@ pub struct Moment {
     pub state: State,
     /// For each gap `free`, `meshing_right` or `meshing_left`.
     pub domains: Vec<&'static str>,
+    /// Forces and signals.
+    pub(crate) outputs: Outputs,
     /// The event, and `before` or `after`.
     event: Option<(EventRow, &'static str)>,
 }
@@ -42,16 +49,24 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
     if starts_in_contact {
         contacts[0] = history.meshing;
     }
-    let mut add = |t, phase, state: &State, contacts: &[Option<Side>], event| {
+    let system = System::new(&oscillator);
+    let mut sliding =
+        Sliding::at_start(&oscillator, samples.first().map_or(&REST, |first| &first.state), slips);
+    let mut add = |t, phase, state: &State, (contacts, sliding): (&[Option<Side>], &Sliding), event| {
         let gap = |gap| [0, 1].map(|velocity| oscillator.gap_value(gap, state, velocity));
+        let (time, slips) = (phase * forcing_period, sliding.modes(&oscillator, state));
+        let is_after = !matches!(event, Some((_, "before")));
+        let outputs = system.outputs(state, &Situation { time, contacts, slips, is_after });
         moments.push(Moment {
             t,
             phase,
             gaps: (0..gaps.len()).map(gap).collect(),
             state: *state,
             domains: contacts[..gaps.len()].iter().copied().map(domain_name).collect(),
+            outputs: outputs.clone(),
             event,
         });
+        outputs
     };
     let mut events = event_row::rows(model, events, slips).into_iter().peekable();
     let mut last = f64::NEG_INFINITY;
@@ -59,12 +74,14 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
         while let Some(event) = events.next_if(|event| is_reached(event.t, sample.t)) {
             let phase = event.t_mod_period / forcing_period;
             last = event.t;
-            add(last, phase, &event.before, &contacts, Some((event.clone(), "before")));
-            if let Place::Wall { gap, meshing, .. } = event.place {
-                contacts[gap] = meshing;
+            let before =
+                add(last, phase, &event.before, (&contacts, &sliding), Some((event.clone(), "before")));
+            match event.place {
+                Place::Wall { gap, meshing, .. } => contacts[gap] = meshing,
+                Place::Element(i) => sliding.change(i, event.kind, before.friction[i]),
             }
             let after = event.after;
-            add(last, phase, &after, &contacts, Some((event, "after")));
+            add(last, phase, &after, (&contacts, &sliding), Some((event, "after")));
         }
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / *samples_per_period as f64;
@@ -72,10 +89,53 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
             if i > 0 || starts_in_contact {
                 contacts[0] = sample.meshing;
             }
-            add(sample.t, phase, &sample.state, &contacts, None);
+            add(sample.t, phase, &sample.state, (&contacts, &sliding), None);
         }
     }
     Ok(moments)
+}
+
+/// Modes of dry friction.
+struct Sliding {
+    sticks: [bool; MOST_FRICTION],
+    /// The direction of an element that slides at a rate of 0.
+    directions: [f64; MOST_FRICTION],
+}
+
+impl Sliding {
+    /// Returns the modes at the start of a motion. The first event of an element tells them, or else its rate.
+    fn at_start(oscillator: &Oscillator, start: &State, slips: &[SlipPoint]) -> Sliding {
+        let sticks = std::array::from_fn(|i| match slips.iter().find(|slip| slip.element == i) {
+            Some(first) => first.kind == SlipKind::Slip,
+            None => oscillator.friction.get(i).is_none_or(|element| rate(element, start) == 0.0),
+        });
+        Sliding { sticks, directions: [0.0; MOST_FRICTION] }
+    }
+
+    /// Enters the mode after an event, before which friction had a force.
+    fn change(&mut self, element: usize, kind: &str, force: f64) {
+        let is = |own: SlipKind| kind == own.name();
+        self.sticks[element] = is(SlipKind::Stick);
+        // The element breaks away in the direction of the force that held it.
+        self.directions[element] = if is(SlipKind::Reversal) { -force } else { force };
+    }
+
+    fn modes(&self, oscillator: &Oscillator, state: &State) -> Slips {
+        let mode = |i: usize| match oscillator.friction.get(i) {
+            Some(element) if !self.sticks[i] => {
+                let rate = rate(element, state);
+                Slip::of(if rate == 0.0 { self.directions[i] } else { rate })
+            }
+            _ => Slip::Stick,
+        };
+        std::array::from_fn(mode)
+    }
+}
+
+/// Returns the sliding rate of an element with dry friction.
+fn rate(element: &DryFriction, state: &State) -> f64 {
+    let terms = element.row.iter().zip(state.iter().skip(1).step_by(2)).map(|(row, velocity)| row * velocity);
+    terms.sum::<f64>() - element.speed
 }
 
 /// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`. The last columns are the name of the gap, if
@@ -105,8 +165,8 @@ pub fn write_events(
     Ok(table.flush()?)
 }
 
-/// Writes `trajectory.csv`, one row per moment. With several gaps, each has a column `domain_` with its name. The last columns are those
-/// of `events.csv`.
+/// Writes `trajectory.csv`, one row per moment. With several gaps, each has a column `domain_` with its name. The columns of `events.csv`
+/// follow, then the force of the contacts of each gap, the force of each friction element, and the signals.
 pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
     let (state_names, several, places) = (model.state_names(), several_gaps(model), PlaceNames::of(model));
@@ -119,10 +179,10 @@ pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) 
     let names_of =
         |place| places.columns(place).into_iter().map(|(column, name)| [column, name].map(str::to_owned));
     let last = names_of(None).map(|[column, _]| column).collect();
-    let head =
-        [own(&["t", "phase"]), gaps, own(&state_names), domains, own(&["event", "side", "moment"]), last];
+    let marks = own(&["event", "side", "moment"]);
+    let head = [own(&["t", "phase"]), gaps, own(&state_names), domains, marks, last, output_columns(model)];
     table.write_record(head.concat())?;
-    for Moment { t, phase, gaps, state, domains, event } in moments {
+    for Moment { t, phase, gaps, state, domains, outputs, event } in moments {
         let numbers = [*t, *phase].into_iter().chain(gaps.concat());
         let numbers = numbers.chain(state[..state_names.len()].iter().copied());
         let texts = numbers.map(|x| format!("{x:?}")).chain(own(domains));
@@ -131,9 +191,24 @@ pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) 
         };
         let marks = event.as_ref().map(mark).unwrap_or_default();
         let place = event.as_ref().map(|(row, _)| row.place);
-        table.write_record(texts.chain(marks).chain(names_of(place).map(|[_, name]| name)))?;
+        let texts = texts.chain(marks).chain(names_of(place).map(|[_, name]| name));
+        let Outputs { contacts, friction, signals } = outputs;
+        let outputs = contacts.iter().chain(friction).chain(signals).map(|x| format!("{x:?}"));
+        table.write_record(texts.chain(outputs))?;
     }
     Ok(table.flush()?)
+}
+
+/// Returns the names of the columns of forces and signals.
+fn output_columns(model: &dyn Model) -> Vec<String> {
+    let Subjects { gaps, signals, .. } = subjects(model);
+    let elements = PlaceNames::of(model).elements.unwrap_or_default();
+    let contacts = match &gaps[..] {
+        [] => vec!["contact_force".to_owned()],
+        gaps => gaps.iter().map(|gap| format!("contact_force_{gap}")).collect(),
+    };
+    let forces = elements.iter().map(|element| element.replace("friction", "friction_force"));
+    contacts.into_iter().chain(forces).chain(signals).collect()
 }
 
 fn domain_name(meshing: Option<Side>) -> &'static str {

@@ -18,7 +18,7 @@ const ID: usize = size_of::<u32>();
 
 /// Number of columns: ids and fields.
 const COUNT: usize = 1 + FIELDS.len();
-const _: () = assert!(COUNT < u32::BITS as usize, "a mask has a bit for each column");
+const _: () = assert!(COUNT <= u32::BITS as usize, "a mask has a bit for each column");
 
 /// Names of the columns, in the order of their bits. A later version may add columns at the end.
 pub(crate) const NAMES: [&str; COUNT] = {
@@ -71,7 +71,7 @@ pub(crate) fn encode(batch: &[(u32, Record)], strobes: usize) -> io::Result<(u32
 
 /// Returns the records of a batch of `cells` cells, or none if the bytes do not encode so many.
 pub(crate) fn decode(mask: u32, cells: usize, strobes: usize, bytes: &[u8]) -> Option<Vec<(u32, Record)>> {
-    if mask >> COUNT != 0 {
+    if mask.checked_shr(COUNT as u32).is_some_and(|unknown| unknown != 0) {
         return None;
     }
     let stored =
@@ -121,7 +121,7 @@ mod tests {
                 let (count, width) = size(column, strobes);
                 count * width
             };
-            let whole: usize = (1..COUNT - 2).map(bytes_of).sum();
+            let whole: usize = (1..COUNT - 3).map(bytes_of).sum();
             assert_eq!(whole, bytes, "{coordinates} coordinates");
             let entries: Vec<f64> = (1..=strobes).map(|n| n as f64 / 3.0).collect();
             let record = Record { strobe: entries.into_iter().collect(), period: 3, ..Record::default() };

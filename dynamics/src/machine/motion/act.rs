@@ -258,7 +258,7 @@ impl MachineMotion<'_> {
             SlipKind::Reversal => Some(b'0'),
         };
         observer.slip(&SlipEvent {
-            element,
+            element: self.system.elements[element].index,
             kind,
             slips: self.modes.slips,
             symbol,

@@ -65,6 +65,7 @@ pub(crate) fn side_by_side(machines: &[Oscillator]) -> Oscillator {
         drives,
         gaps,
         friction,
+        signals: Vec::new(),
     }
 }
 
@@ -97,5 +98,6 @@ pub(crate) fn in_coordinates(machine: &Oscillator, t: &DMatrix<f64>) -> Oscillat
         friction: (machine.friction.iter())
             .map(|one| DryFriction { row: vector(&one.row), ..one.clone() })
             .collect(),
+        signals: Vec::new(),
     }
 }

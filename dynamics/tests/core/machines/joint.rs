@@ -34,6 +34,7 @@ fn row_of_masses(loads: &[f64]) -> Oscillator {
         drives: Vec::new(),
         gaps: (0..n).map(gap).collect(),
         friction: Vec::new(),
+        signals: Vec::new(),
     }
 }
 

@@ -188,8 +188,16 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     };
     let drives = orders.into_iter().map(drive).collect();
     let omega = random.logarithmic(0.8, 5.0);
-    let mut machine =
-        Oscillator { omega, mass, stages, schedule, drives, gaps: Vec::new(), friction: Vec::new() };
+    let mut machine = Oscillator {
+        omega,
+        mass,
+        stages,
+        schedule,
+        drives,
+        gaps: Vec::new(),
+        friction: Vec::new(),
+        signals: Vec::new(),
+    };
     let mut rows: Vec<Vector> = Vec::new();
     while rows.len() < shape.gaps {
         rows.push(row(random, n));

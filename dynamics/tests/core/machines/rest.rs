@@ -30,6 +30,7 @@ fn machine(
         drives: vec![Drive { order: 1, cos, sin }],
         gaps: vec![GapRow { row: DVector::from_row_slice(gap), walls }],
         friction: Vec::new(),
+        signals: Vec::new(),
     }
 }
 

@@ -86,11 +86,14 @@ impl OrbitPlot<'_> {
         let displacements = self.other_displacements();
         let label = |index: &usize| format!("displacement, {}", self.names[*index]);
         let others = displacements.iter().map(|index| self.state_axis(&label(index), &[*index], 1.0));
-        let axes: Vec<Axis> = self.gaps.iter().map(|gap| self.gap_axis(gap)).chain(others).collect();
+        let axes: Vec<Axis> =
+            self.gaps.iter().map(|gap| self.gap_axis(gap)).chain(others).chain(self.signal_axes()).collect();
         let height = HISTORY_HEIGHT[0] + HISTORY_HEIGHT[1] * (axes.len() - 1) as f64;
         let panels = stacked(canvas, top, height, &vec![1.0; axes.len()]).into_iter().zip(axes).collect();
         let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, self.wall_names(canvas));
-        let (of_gaps, of_displacements) = frames.split_at(self.gaps.len());
+        let (of_gaps, others) = frames.split_at(self.gaps.len());
+        let (of_displacements, of_signals) = others.split_at(displacements.len());
+        self.draw_signals(canvas, of_signals);
         for (frame, gap) in of_gaps.iter().zip(&self.gaps) {
             self.draw_gap_panel(canvas, frame, gap);
         }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::model_file::subjects;
 use crate::show::color::Color;
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::Frame;
@@ -12,6 +13,7 @@ use crate::show::figure::orbit::heading;
 use crate::show::figure::orbit::motion::DrawnMotion;
 use crate::show::names;
 use crate::show::symbols::{symbol, with_unit};
+use crate::show::table::orbit_tables;
 use rattlemap_dynamics::model::{Contact, Model, ModelError, Oscillator, Side, State, Units};
 use rattlemap_dynamics::orbit::{
     Class, Event, EventKind, History, Orbit, Sample, SlipKind, SlipPoint, is_reached,
@@ -35,6 +37,8 @@ pub struct OrbitPlot<'a> {
     pub(crate) motion: DrawnMotion,
     /// Events of friction within the trace, with their times.
     slips: Vec<(f64, SlipPoint)>,
+    /// Names of the signals with their units, and their values with times.
+    signals: Vec<(String, Vec<Point>)>,
     /// Label of the axis of time.
     time: String,
     /// Length of the cycle in forcing periods; none if the motion is not periodic.
@@ -57,7 +61,17 @@ impl<'a> OrbitPlot<'a> {
         let subtitle = heading::character(model, orbit);
         let plot = OrbitPlot::of(model, (&orbit.events, trace), orbit.forcing_period, subtitle)?;
         let slips = slips_within(&orbit.slips, trace, orbit.forcing_period);
-        Ok(OrbitPlot { cycle, slips, ..plot })
+        let turns = trace.last().map_or(1.0, |last| last.t / orbit.forcing_period);
+        let history = History {
+            meshing: orbit.strobe_meshing,
+            samples: trace.to_vec(),
+            events: orbit.events.clone(),
+            slips: orbit.slips.clone(),
+            samples_per_period: ((trace.len() as f64 - 1.0) / turns).round().max(1.0) as usize,
+            forcing_period: orbit.forcing_period,
+        };
+        let signals = signals(model, &history, orbit.forcing_period)?;
+        Ok(OrbitPlot { cycle, slips, signals, ..plot })
     }
 
     /// Prepares the figure of a motion from `start`. Its times are not divided by the forcing period.
@@ -72,7 +86,8 @@ impl<'a> OrbitPlot<'a> {
         let parts = (&history.events[..], &history.samples[..]);
         let plot = OrbitPlot::of(model, parts, 1.0, heading::from_start(model, start))?;
         let slips = slips_within(&history.slips, &history.samples, 1.0);
-        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), slips, ..plot })
+        let signals = signals(model, history, 1.0)?;
+        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), slips, signals, ..plot })
     }
 
     fn of(
@@ -90,6 +105,7 @@ impl<'a> OrbitPlot<'a> {
             bodies: model.bodies(),
             motion: DrawnMotion::new(events, trace, contacts, unit_of_time),
             slips: Vec::new(),
+            signals: Vec::new(),
             oscillator,
             gaps,
             time: "time in forcing periods, t / T".to_owned(),
@@ -256,6 +272,23 @@ impl<'a> OrbitPlot<'a> {
         Axis::exact(&self.time, first, end)
     }
 
+    /// Returns the axes of the signals.
+    pub(crate) fn signal_axes(&self) -> impl Iterator<Item = Axis> + '_ {
+        let values = |line: &[Point]| line.iter().map(|point| point.1).collect::<Vec<_>>();
+        self.signals
+            .iter()
+            .map(move |(label, line)| Axis::around(label, values(line).into_iter(), self.decayed()))
+    }
+
+    /// Draws each signal in one of these panels.
+    pub(crate) fn draw_signals(&self, canvas: &Canvas, frames: &[Frame]) {
+        for (frame, (_, line)) in frames.iter().zip(&self.signals) {
+            frame.draw_grid(canvas);
+            let path: Vec<_> = line.iter().map(|&(t, value)| frame.at(t, value)).collect();
+            canvas.stroke(&path, FREE_LINE, DARK);
+        }
+    }
+
     /// Returns an axis for components of the state, with their unit if they have the same one. `scale` is their scale
     /// relative to a displacement.
     pub(crate) fn state_axis(&self, label: &str, components: &[usize], scale: f64) -> Axis {
@@ -264,6 +297,21 @@ impl<'a> OrbitPlot<'a> {
         let unit = units.next().flatten().filter(|first| units.all(|unit| unit.as_ref() == Some(first)));
         Axis::around(&with_unit(label, unit.as_deref()), values, self.decayed() * scale)
     }
+}
+
+/// Returns the signals along a motion, with times divided by `unit`.
+fn signals(model: &dyn Model, history: &History, unit: f64) -> Result<Vec<(String, Vec<Point>)>, ModelError> {
+    let (names, units) = (subjects(model).signals, model.units().signals);
+    if names.is_empty() {
+        return Ok(Vec::new());
+    }
+    let moments = orbit_tables::moments(model, history)?;
+    let line = |i: usize| -> Vec<Point> {
+        let points = moments.iter().map(|moment| (moment.t / unit, moment.outputs.signals[i]));
+        points.filter(|(t, value)| t.is_finite() && value.is_finite()).collect()
+    };
+    let labelled = names.iter().zip(units).enumerate();
+    Ok(labelled.map(|(i, (name, unit))| (with_unit(&symbol(name), unit.as_deref()), line(i))).collect())
 }
 
 /// Returns the events of friction before the end of the trace, with their times divided by `unit`.

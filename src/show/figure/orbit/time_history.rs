@@ -1,6 +1,7 @@
-//! Displacements and velocities of all bodies against time.
+//! Displacements and velocities of all bodies, and signals, against time.
 
 use crate::show::color::Color;
+use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
 use crate::show::drawing::{BODIES, Canvas, wall_color};
@@ -32,9 +33,13 @@ impl OrbitPlot<'_> {
             self.state_axis(label, &components, scale)
         };
         let axes = [axis(0, "displacement, x", 1.0), axis(1, "velocity, v", self.oscillator.omega)];
-        let panels = stacked(canvas, top, HEIGHT, &[1.0, 1.0]).into_iter().zip(axes).collect();
+        let axes: Vec<Axis> = axes.into_iter().chain(self.signal_axes()).collect();
+        let height = HEIGHT * axes.len() as f64 / 2.0;
+        let panels = stacked(canvas, top, height, &vec![1.0; axes.len()]).into_iter().zip(axes).collect();
         let frames = column(canvas, panels, &self.time_axis(), ORBIT_LEFT, 0.0);
-        for (quantity, frame) in frames.iter().enumerate() {
+        let (of_states, of_signals) = frames.split_at(2);
+        self.draw_signals(canvas, of_signals);
+        for (quantity, frame) in of_states.iter().enumerate() {
             for piece in &self.motion.pieces {
                 let (from, to) = piece.span();
                 // Where several gaps are in contact, their bands lie upon each other.
@@ -50,7 +55,9 @@ impl OrbitPlot<'_> {
                 self.draw_lines(canvas, frame, &gaps, (color, color), at);
                 self.draw_markers(canvas, frame, &gaps, quantity == 1, at);
             }
-            frame.draw_axes(canvas, quantity == 1);
+        }
+        for (n, frame) in frames.iter().enumerate() {
+            frame.draw_axes(canvas, n + 1 == frames.len());
         }
     }
 }

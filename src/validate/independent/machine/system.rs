@@ -490,5 +490,6 @@ fn transformed(machine: &Oscillator, [length, speed]: [f64; 2], from: &DMatrix<f
                 speed: belt / speed,
             })
             .collect(),
+        signals: Vec::new(),
     }
 }
