@@ -7,13 +7,23 @@ use std::process::Command as Process;
 
 use crate::common::{rattlemap, run, says, with_scene};
 
-/// Makes the folder `cut` from the folder `out` and the calls of `faults/journal.c`: names and parts of files that were not
-/// synced are lost.
-fn cut(calls: &[Vec<&str>], out: &Path, cut: &Path) {
+/// What a power cut leaves of a file behind its synced part.
+#[derive(Clone, Copy, Debug)]
+enum Tail {
+    /// Nothing: the length was not written either.
+    Lost,
+    /// Zeros: the length was written before the data.
+    Zeros,
+    /// Every other block of 512 bytes: the data were written in another order.
+    Torn,
+}
+
+/// Makes the folder `cut` from the folder `out` and the first calls of `faults/journal.c`: names that were not synced are lost, and of files
+/// the synced part is left, with this tail. Returns whether the folder itself is left.
+fn cut(calls: &[Vec<&str>], out: &Path, cut: &Path, tail: Tail) -> bool {
     let is_synced = |calls: &[Vec<&str>], folder| {
         calls.iter().any(|call| call[0] == "sync" && Path::new(call[2]) == folder)
     };
-    assert!(is_synced(calls, out.parent().unwrap()), "the folder is lost");
     let names =
         calls.iter().enumerate().filter(|(nth, call)| call[0] == "rename" && is_synced(&calls[*nth..], out));
     let names: HashMap<&str, &str> = names.map(|(_, call)| (call[3], call[1])).collect();
@@ -21,12 +31,19 @@ fn cut(calls: &[Vec<&str>], out: &Path, cut: &Path) {
     fs::create_dir(cut).unwrap();
     for (path, inode) in names.into_iter().filter(|(path, _)| Path::new(path).exists()) {
         let synced = calls.iter().rfind(|call| call[0] == "sync" && call[1] == inode);
-        let bytes = fs::read(path).unwrap();
+        let mut bytes = fs::read(path).unwrap();
         let size = synced.map_or(0, |call| call[3].parse().unwrap());
-        fs::write(cut.join(Path::new(path).file_name().unwrap()), &bytes[..size]).unwrap();
+        match tail {
+            Tail::Lost => bytes.truncate(size),
+            Tail::Zeros => bytes[size..].fill(0),
+            Tail::Torn => bytes[size..].chunks_mut(512).step_by(2).for_each(|block| block.fill(0)),
+        }
+        fs::write(cut.join(Path::new(path).file_name().unwrap()), &bytes).unwrap();
     }
+    is_synced(calls, out.parent().unwrap())
 }
 
+/// A power cut at the end of a command loses nothing, and one before it only work that a resumed run does again.
 #[test]
 fn what_a_command_has_written_survives_a_power_cut() {
     let folder = with_scene(crate::faults::SCENE);
@@ -47,7 +64,19 @@ fn what_a_command_has_written_survives_a_power_cut() {
         recorded.args(line.replace("OUT", out.to_str().unwrap()).split(' ')).assert().success();
         let text = fs::read_to_string(&journal).unwrap();
         let calls: Vec<Vec<&str>> = text.lines().map(|line| line.split('\t').collect()).collect();
-        cut(&calls, &out, &root.join("cut"));
+        assert!(cut(&calls, &out, &root.join("cut"), Tail::Lost), "the folder is lost");
         run(&folder, "check cut").success().stderr(says(&["all 2 files are as manifest.json says"]));
+        if line.starts_with("merge") {
+            continue;
+        }
+        let cells = fs::read(out.join("cells.csv")).unwrap();
+        for count in 0..calls.len() {
+            for tail in [Tail::Lost, Tail::Zeros, Tail::Torn] {
+                cut(&calls[..count], &out, &root.join("cut"), tail);
+                run(&folder, &format!("{map} cut --resume")).success();
+                let resumed = fs::read(root.join("cut/cells.csv")).unwrap();
+                assert!(resumed == cells, "after {count} calls, {tail:?}");
+            }
+        }
     }
 }
