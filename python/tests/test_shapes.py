@@ -13,7 +13,7 @@ import rattlemap as rm
 
 #: One coordinate, one gap; two coordinates, mesh; dry friction; stages, no force; eight coordinates; several gaps.
 SHAPES = ("impact-oscillator", "gear-pair", "friction-oscillator", "meissner", "absorber-chain", "two-loose-gears", "several.toml")
-#: Two gaps and friction; a parameter, a coordinate and a gap have names like those of columns.
+#: Two gaps, friction and a signal; a parameter, a coordinate and a gap have names like those of columns.
 SEVERAL = """
 name = "several"
 parameters = { omega = 1.0, gap = 0.2 }
@@ -25,6 +25,7 @@ motion.force = [1, 0]
 motion.frequency = "omega"
 motion.gap = { a = [1, 0], domains = [0, 1] }
 friction = [{ row = [0, 1], force = 0.1 }]
+signal = [{ name = "event_sum", velocity = [1, 1], acceleration = [0, 1], cos = 1 }]
 [[contact]]
 gap = "a"
 side = "right"
