@@ -75,14 +75,6 @@ impl Progress {
         }
     }
 
-    /// Removes the bar while `print` prints.
-    pub fn suspend(&self, print: impl FnOnce()) {
-        match self {
-            Progress::Bar(bar, _) => bar.suspend(print),
-            Progress::Quiet | Progress::Lines(_) => print(),
-        }
-    }
-
     /// Removes the bar.
     pub(super) fn clear(&self) {
         if let Progress::Bar(bar, _) = self {

@@ -240,11 +240,6 @@ impl<'p> MapRun<'p> {
         self.done
     }
 
-    /// Number of runs expected so far. It can grow while an adaptive map is refined.
-    pub fn expected(&self) -> usize {
-        self.work.schedule.expected()
-    }
-
     /// Whether stored records were damaged.
     pub fn is_damaged(&self) -> bool {
         self.records.as_ref().is_some_and(|records| records.damage().is_some())

@@ -199,17 +199,6 @@ impl Plan {
         first(&self.flows).or_else(|| first(&self.laws)).map_or(Ok(()), Err)
     }
 
-    /// Returns a plan of the same cells with at most `periods` forcing periods each, half of them observed, for trials.
-    pub fn shortened(&self, periods: u32) -> Plan {
-        let mut plan = self.clone();
-        let settings = &mut plan.budget.settings;
-        settings.transient_periods = settings.transient_periods.min(periods / 2);
-        settings.observed_periods = settings.observed_periods.min(periods / 2);
-        settings.max_period = settings.max_period.min(settings.observed_periods / 2);
-        (plan.budget.undecided_periods, plan.budget.confirm_chaos) = (0, 0);
-        plan
-    }
-
     /// Returns the two axes; empty for a list.
     pub fn axes(&self) -> &[Axis] {
         self.points.axes()

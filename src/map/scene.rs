@@ -306,12 +306,6 @@ impl Scene {
         self.points.swept()
     }
 
-    /// Whether an axis or a column sets a parameter.
-    pub fn sweeps(&self, parameter: &Parameter) -> bool {
-        let index = self.base().index(&parameter.name).ok();
-        index.is_some_and(|index| self.points.targets().any(|target| target == Target::Parameter(index)))
-    }
-
     /// Whether cells differ in their starts.
     pub fn sweeps_start(&self) -> bool {
         self.points.sweeps_start()

@@ -260,11 +260,6 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
 }
 
 impl Definition {
-    /// Returns the first wall on a side of the first gap.
-    pub fn wall(&self, side: Side) -> Option<&Wall> {
-        self.walls[0][side.index()].first()
-    }
-
     /// Returns what depends on the parameter with this index.
     fn shaped_by(&self, index: usize) -> Shapes {
         let uses = |entry: &Expression| entry.uses().contains(&index);

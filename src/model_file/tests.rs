@@ -142,7 +142,7 @@ fn two_degrees_of_freedom_and_walls_of_different_laws() {
     assert_eq!(model.law(), Law { restitution: [0.5, 0.0], mesh_speed: [0.05, 0.0] });
     let both = &model.parameters()[model.index("c").unwrap()];
     assert_eq!(both.shapes, Shapes::Both);
-    assert!(model.definition().wall(Side::Left).is_some());
+    assert!(!model.definition().walls[0][1].is_empty());
 }
 
 #[test]

@@ -221,11 +221,6 @@ impl<'f> RunRecords<'f> {
         Some(format!("{}: {damage}; {count} {unit} are kept, the others are computed again", path.display()))
     }
 
-    /// The folder of the record file.
-    pub fn folder(&self) -> &'f Folder {
-        self.folder
-    }
-
     /// Time that earlier runs spent.
     pub fn elapsed_before(&self) -> Duration {
         self.elapsed_before
