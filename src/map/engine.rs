@@ -13,6 +13,7 @@ mod flows;
 mod gpu;
 mod requested;
 
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -96,47 +97,69 @@ pub enum Engine<'p> {
     Fake(Fake),
 }
 
-/// Properties of an engine's device; the defaults are those of an engine without a device of its own.
-trait Device {
+/// What is known of an engine without computing a cell. The defaults are those of an engine without a device of its own.
+pub trait Properties {
+    /// Returns the name in manifests and record files.
     fn name(&self) -> &'static str;
 
+    /// Returns the precision in manifests and record files.
     fn precision(&self) -> &'static str {
         "f64"
     }
 
+    /// Describes the device. The text is part of a record file's identity, since only one device reproduces results bit
+    /// by bit.
     fn device(&self) -> String;
 
+    /// Returns the graphics adapter; none if the engine uses none.
+    #[cfg(feature = "gpu")]
+    fn adapter(&self) -> Option<AdapterId> {
+        None
+    }
+
+    /// Returns the largest number of bytes that the map needs in the device's memory; none without a device.
     fn device_bytes(&self) -> Option<u64> {
         None
     }
 
+    /// Returns the smallest number of cells that keeps the engine busy. A map begins with so many.
     fn least_batch(&self) -> usize;
 
+    /// Returns the largest number of cells under way. It bounds the memory that a fast engine uses.
     fn largest_batch(&self) -> usize {
         LARGEST_BATCH
     }
 
+    /// Returns the number of free steps that lanes have taken so far; none without a time grid.
     fn lane_steps(&self) -> Option<u64> {
         None
     }
 
+    /// Returns the smallest and the largest number of free steps per forcing period, over all flows that lanes support;
+    /// none without a time grid.
     fn steps_per_period(&self) -> Option<[u32; 2]> {
         None
     }
 
+    /// Returns the number of cells for which the engine has memory now.
     fn room(&self) -> usize {
         usize::MAX
     }
 
+    /// Returns the time that it took to prepare the engine; zero without lanes.
     fn preparation(&self) -> Preparation {
         Preparation::default()
     }
 
+    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have
+    /// ended.
     fn stop_on(&mut self, halt: &Arc<AtomicBool>);
 }
 
-impl Engine<'_> {
-    fn properties(&self) -> &dyn Device {
+impl<'p> Deref for Engine<'p> {
+    type Target = dyn Properties + 'p;
+
+    fn deref(&self) -> &(dyn Properties + 'p) {
         match self {
             Engine::Cpu(cpu) => cpu,
             #[cfg(feature = "gpu")]
@@ -144,80 +167,20 @@ impl Engine<'_> {
             Engine::Fake(fake) => fake,
         }
     }
+}
 
-    /// Returns the name in manifests and record files.
-    pub fn name(&self) -> &'static str {
-        self.properties().name()
-    }
-
-    /// Returns the precision in manifests and record files.
-    pub fn precision(&self) -> &'static str {
-        self.properties().precision()
-    }
-
-    /// Describes the device. The text is part of a record file's identity, since only one device reproduces results bit
-    /// by bit.
-    pub fn device(&self) -> String {
-        self.properties().device()
-    }
-
-    /// Returns the graphics adapter; none if the engine uses none.
-    #[cfg(feature = "gpu")]
-    pub fn adapter(&self) -> Option<AdapterId> {
+impl<'p> DerefMut for Engine<'p> {
+    fn deref_mut(&mut self) -> &mut (dyn Properties + 'p) {
         match self {
-            Engine::Gpu(gpu) => Some(gpu.adapter()),
-            _ => None,
-        }
-    }
-
-    /// Returns the largest number of bytes that the map needs in the device's memory; none without a device.
-    pub fn device_bytes(&self) -> Option<u64> {
-        self.properties().device_bytes()
-    }
-
-    /// Returns the smallest number of cells that keeps the engine busy. A map begins with so many.
-    pub fn least_batch(&self) -> usize {
-        self.properties().least_batch()
-    }
-
-    /// Returns the largest number of cells under way. It bounds the memory that a fast engine uses.
-    pub fn largest_batch(&self) -> usize {
-        self.properties().largest_batch()
-    }
-
-    /// Returns the number of free steps that lanes have taken so far; none without a time grid.
-    pub fn lane_steps(&self) -> Option<u64> {
-        self.properties().lane_steps()
-    }
-
-    /// Returns the smallest and the largest number of free steps per forcing period, over all flows that lanes support;
-    /// none without a time grid.
-    pub fn steps_per_period(&self) -> Option<[u32; 2]> {
-        self.properties().steps_per_period()
-    }
-
-    /// Returns the number of cells for which the engine has memory now.
-    pub fn room(&self) -> usize {
-        self.properties().room()
-    }
-
-    /// Returns the time that it took to prepare the engine; zero without lanes.
-    pub fn preparation(&self) -> Preparation {
-        self.properties().preparation()
-    }
-
-    /// Sets the flag that stops the engine: while it is raised, [`Engine::advance`] soon returns the cells that have
-    /// ended.
-    pub fn stop_on(&mut self, halt: &Arc<AtomicBool>) {
-        let engine: &mut dyn Device = match self {
             Engine::Cpu(cpu) => cpu,
             #[cfg(feature = "gpu")]
             Engine::Gpu(gpu) => &mut **gpu,
             Engine::Fake(fake) => fake,
-        };
-        engine.stop_on(halt);
+        }
     }
+}
 
+impl Engine<'_> {
     /// Begins cells. [`Engine::advance`] returns their records.
     ///
     /// # Errors

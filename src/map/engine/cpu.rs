@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use web_time::Instant;
 
 use super::flows::Flows;
-use super::{Device, LARGEST_BATCH, measured_record};
+use super::{LARGEST_BATCH, Properties, measured_record};
 use crate::map::plan::{Cell, Plan};
 use crate::record::Record;
 use rattlemap_dynamics::motion::Flow;
@@ -93,7 +93,7 @@ impl<'p> Cpu<'p> {
     }
 }
 
-impl Device for Cpu<'_> {
+impl Properties for Cpu<'_> {
     fn name(&self) -> &'static str {
         "cpu"
     }

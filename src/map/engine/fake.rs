@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::{Device, EngineError};
+use super::{EngineError, Properties};
 use crate::map::plan::Cell;
 use crate::record::Record;
 
@@ -68,7 +68,7 @@ impl Fake {
     }
 }
 
-impl Device for Fake {
+impl Properties for Fake {
     fn name(&self) -> &'static str {
         "fake"
     }

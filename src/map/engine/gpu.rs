@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use web_time::Instant;
 
 use super::finish::{Completion, Ended, Finishing, is_unfinished};
-use super::{Device, EngineError, Preparation, drop_unrequested};
+use super::{EngineError, Preparation, Properties, drop_unrequested};
 use crate::gpu::{
     self, AdapterId, Constants, Features, GpuError, Lane, LaneResult, LaneSettings, Measures, Pool, Tables,
     Traffic,
@@ -214,10 +214,6 @@ impl<'p> Gpu<'p> {
         self.device
     }
 
-    pub(super) fn adapter(&self) -> AdapterId {
-        self.device.id()
-    }
-
     fn is_hardware(&self) -> bool {
         gpu::is_hardware(self.device.adapter())
     }
@@ -367,7 +363,7 @@ impl<'p> Gpu<'p> {
     }
 }
 
-impl Device for Gpu<'_> {
+impl Properties for Gpu<'_> {
     fn name(&self) -> &'static str {
         "gpu"
     }
@@ -383,6 +379,10 @@ impl Device for Gpu<'_> {
 
     fn device(&self) -> String {
         gpu::describe(self.device.adapter())
+    }
+
+    fn adapter(&self) -> Option<AdapterId> {
+        Some(self.device.id())
     }
 
     fn least_batch(&self) -> usize {
