@@ -28,49 +28,23 @@ struct Style {
     shape: Shape,
 }
 
+const fn style(method: &'static str, label: &'static str, color: Color, shape: Shape) -> Style {
+    Style { method, label, color, shape }
+}
+
 /// Methods in the order of the legend. Those of this project have circles.
 const STYLES: [Style; 11] = [
-    Style { method: "lane-f32", label: "lane, f32", color: [0xd5, 0x5e, 0x00], shape: Shape::Circle },
-    Style { method: "lane-f64", label: "lane, f64", color: [0x00, 0x72, 0xb2], shape: Shape::Circle },
-    Style {
-        method: "reference",
-        label: "reference (error zero by definition)",
-        color: [0x26, 0x26, 0x26],
-        shape: Shape::Circle,
-    },
-    Style {
-        method: "rk4-wgsl-f32",
-        label: "RK4 in WGSL, one loop, f32",
-        color: [0xe6, 0x9f, 0x00],
-        shape: Shape::Triangle,
-    },
-    Style {
-        method: "rk4-wgsl-f64",
-        label: "RK4 in WGSL, one loop, f64",
-        color: [0x56, 0xb4, 0xe9],
-        shape: Shape::Triangle,
-    },
-    Style {
-        method: "rk4-phased-f32",
-        label: "RK4 in WGSL, two phases, f32",
-        color: [0x9a, 0x6a, 0x00],
-        shape: Shape::Triangle,
-    },
-    Style {
-        method: "rk4-phased-f64",
-        label: "RK4 in WGSL, two phases, f64",
-        color: [0x1b, 0x6f, 0x8f],
-        shape: Shape::Triangle,
-    },
-    Style { method: "rk4-core", label: "RK4 in Rust", color: [0x60, 0x60, 0x60], shape: Shape::Triangle },
-    Style { method: "rk4-numba", label: "RK4 in numba", color: [0xcc, 0x79, 0xa7], shape: Shape::Triangle },
-    Style {
-        method: "dop853-core",
-        label: "DOP853 (ode_solvers)",
-        color: [0x00, 0x9e, 0x73],
-        shape: Shape::Square,
-    },
-    Style { method: "heyoka", label: "heyoka", color: [0x6a, 0x3d, 0x9a], shape: Shape::Square },
+    style("lane-f32", "lane, f32", [0xd5, 0x5e, 0x00], Shape::Circle),
+    style("lane-f64", "lane, f64", [0x00, 0x72, 0xb2], Shape::Circle),
+    style(MEASURE, "reference (error zero by definition)", [0x26, 0x26, 0x26], Shape::Circle),
+    style("rk4-wgsl-f32", "RK4 in WGSL, one loop, f32", [0xe6, 0x9f, 0x00], Shape::Triangle),
+    style("rk4-wgsl-f64", "RK4 in WGSL, one loop, f64", [0x56, 0xb4, 0xe9], Shape::Triangle),
+    style("rk4-phased-f32", "RK4 in WGSL, two phases, f32", [0x9a, 0x6a, 0x00], Shape::Triangle),
+    style("rk4-phased-f64", "RK4 in WGSL, two phases, f64", [0x1b, 0x6f, 0x8f], Shape::Triangle),
+    style("rk4-core", "RK4 in Rust", [0x60, 0x60, 0x60], Shape::Triangle),
+    style("rk4-numba", "RK4 in numba", [0xcc, 0x79, 0xa7], Shape::Triangle),
+    style("dop853-core", "DOP853 (ode_solvers)", [0x00, 0x9e, 0x73], Shape::Square),
+    style("heyoka", "heyoka", [0x6a, 0x3d, 0x9a], Shape::Square),
 ];
 
 /// Title, axis label and error of a figure.

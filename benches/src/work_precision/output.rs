@@ -3,6 +3,7 @@
 use std::io::Write;
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::PERIODS;
 use super::cells::{Kind, Subject};
@@ -15,8 +16,8 @@ use rattlemap::show::error::WriteError;
 use rattlemap::show::parameters::Parameters;
 use rattlemap::store::error::OutputError;
 use rattlemap::store::folder::Folder;
-use rattlemap::store::inventory::{self, FileEntry};
-use rattlemap::store::manifest::{Head, MANIFEST};
+use rattlemap::store::inventory;
+use rattlemap::store::manifest::{Head, MANIFEST, joined};
 use rattlemap_dynamics::model::State;
 
 const TABLE: &str = "work_precision.csv";
@@ -80,41 +81,6 @@ pub struct Run<'a> {
 }
 
 #[derive(Serialize)]
-struct Manifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    #[serde(flatten)]
-    run: &'a Run<'a>,
-    periods: u32,
-    cells: Vec<CellObject>,
-    files: Vec<FileEntry>,
-}
-
-/// A cell with the parameters of its first variant and the largest amplification of all variants.
-#[derive(Serialize)]
-struct CellObject {
-    kind: Kind,
-    e: f64,
-    omega: f64,
-    #[serde(rename = "F")]
-    force: f64,
-    beyond: Option<f64>,
-    amplification: f64,
-    variants: usize,
-}
-
-/// A subject for other programs.
-#[derive(Serialize)]
-struct SubjectObject {
-    kind: Kind,
-    parameters: Parameters,
-    periods: u32,
-    start: [f64; 4],
-    state: [f64; 4],
-    events: Vec<f64>,
-}
-
-#[derive(Serialize)]
 struct CellRow<'a> {
     method: &'a str,
     steps: Option<u32>,
@@ -149,38 +115,43 @@ pub fn write(
     for (name, view) in FIGURES {
         folder.replace(name, |out| figure::write(out, &subtitle, view, &all))?;
     }
-    let manifest = Manifest {
-        head: Head::of("work-precision"),
-        run,
-        periods: PERIODS,
-        cells: subjects.chunk_by(|a, b| a.cell == b.cell).map(cell).collect(),
-        files: inventory::entries(folder, &FILES[..FILES.len() - 1])?,
-    };
+    let manifest = joined([
+        json!(Head::of("work-precision")),
+        json!(run),
+        json!({
+            "periods": PERIODS,
+            "cells": subjects.chunk_by(|a, b| a.cell == b.cell).map(cell).collect::<Vec<_>>(),
+            "files": inventory::entries(folder, &FILES[..FILES.len() - 1])?,
+        }),
+    ]);
     inventory::write_manifest(folder, &manifest)
 }
 
-fn cell(variants: &[Subject]) -> CellObject {
-    let first = &variants[0];
-    CellObject {
-        kind: first.kind,
-        e: first.pair.e,
-        omega: first.pair.omega,
-        force: first.pair.force,
-        beyond: first.beyond,
-        amplification: variants.iter().map(|subject| subject.amplification).fold(0.0, farther),
-        variants: variants.len(),
-    }
+/// Describes a cell by the parameters of its first variant and the largest amplification of all variants.
+fn cell(variants: &[Subject]) -> Value {
+    let Subject { kind, pair, beyond, .. } = &variants[0];
+    json!({
+        "kind": kind,
+        "e": pair.e,
+        "omega": pair.omega,
+        "F": pair.force,
+        "beyond": beyond,
+        "amplification": variants.iter().map(|subject| subject.amplification).fold(0.0, farther),
+        "variants": variants.len(),
+    })
 }
 
-fn subject(subject: &Subject) -> SubjectObject {
-    SubjectObject {
-        kind: subject.kind,
-        parameters: Parameters::of(&subject.pair),
-        periods: PERIODS,
-        start: first_four(&subject.start),
-        state: first_four(&subject.exact.state),
-        events: subject.exact.events.iter().copied().filter(|t| !t.is_nan()).collect(),
-    }
+/// Describes a subject for other programs.
+fn subject(subject: &Subject) -> Value {
+    let times = subject.exact.events.iter().filter(|t| !t.is_nan());
+    json!({
+        "kind": subject.kind,
+        "parameters": Parameters::of(&subject.pair),
+        "periods": PERIODS,
+        "start": first_four(&subject.start),
+        "state": first_four(&subject.exact.state),
+        "events": times.collect::<Vec<_>>(),
+    })
 }
 
 /// Returns the numbers of a state of two coordinates.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::figure;
 use super::measure::{Run, SCENE, SampleCheck, Series};
@@ -15,7 +15,7 @@ use crate::show::error::WriteError;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory::{self, FileEntry};
-use crate::store::manifest::{Head, MANIFEST};
+use crate::store::manifest::{Head, MANIFEST, joined};
 use crate::validate::Kind;
 use rattlemap_dynamics::orbit::Class;
 
@@ -87,65 +87,39 @@ fn write_table(out: impl Write, all: &[Series]) -> Result<(), WriteError> {
     Ok(table.flush()?)
 }
 
-#[derive(Serialize)]
-struct EnginesManifest<'a> {
-    #[serde(flatten)]
-    head: Head,
-    scene: &'static str,
-    budget_seconds: f64,
-    processor: String,
-    cores: usize,
-    series: Vec<SeriesObject<'a>>,
-    files: &'a [FileEntry],
+fn manifest(all: &[Series], budget_seconds: f64, files: &[FileEntry]) -> Value {
+    joined([
+        json!(Head::of("bench engines")),
+        json!({
+            "scene": SCENE,
+            "budget_seconds": budget_seconds,
+            "processor": processor::described(),
+            "cores": processor::cores(),
+            "series": all.iter().map(of_series).collect::<Vec<_>>(),
+            "files": files,
+        }),
+    ])
 }
 
-#[derive(Serialize)]
-struct SeriesObject<'a> {
-    engine: &'static str,
-    precision: &'static str,
-    device: &'a str,
-    open_seconds: f64,
-    skipped: Option<&'a (usize, String)>,
-    check: Option<CheckObject<'a>>,
+fn of_series(series: &Series) -> Value {
+    json!({
+        "engine": series.target.engine(),
+        "precision": series.target.precision.name(),
+        "device": series.target.device,
+        "open_seconds": series.open_seconds,
+        "skipped": series.skipped,
+        "check": series.check.as_ref().map(of_check),
+    })
 }
 
-#[derive(Serialize)]
-struct CheckObject<'a> {
-    samples: usize,
-    mismatched: usize,
-    kinds: BTreeMap<&'static str, usize>,
-    faults: Vec<String>,
-    /// Restitution and frequency of each cell.
-    unexplained_cells: &'a [[f64; 2]],
-}
-
-fn check_object(SampleCheck { validation, unexplained }: &SampleCheck) -> CheckObject<'_> {
+/// Describes a comparison with the reference. A cell without an explanation has its restitution and frequency.
+fn of_check(SampleCheck { validation, unexplained }: &SampleCheck) -> Value {
     let kinds = Kind::ALL.into_iter().map(|kind| (kind.name(), validation.of_kind(kind)));
-    CheckObject {
-        samples: validation.replayed,
-        mismatched: validation.mismatches.len(),
-        kinds: kinds.filter(|(_, count)| *count > 0).collect(),
-        faults: validation.faults(),
-        unexplained_cells: unexplained,
-    }
-}
-
-fn manifest<'a>(all: &'a [Series], budget_seconds: f64, files: &'a [FileEntry]) -> EnginesManifest<'a> {
-    let object = |series: &'a Series| SeriesObject {
-        engine: series.target.engine(),
-        precision: series.target.precision.name(),
-        device: &series.target.device,
-        open_seconds: series.open_seconds,
-        skipped: series.skipped.as_ref(),
-        check: series.check.as_ref().map(check_object),
-    };
-    EnginesManifest {
-        head: Head::of("bench engines"),
-        scene: SCENE,
-        budget_seconds,
-        processor: processor::described(),
-        cores: processor::cores(),
-        series: all.iter().map(object).collect(),
-        files,
-    }
+    json!({
+        "samples": validation.replayed,
+        "mismatched": validation.mismatches.len(),
+        "kinds": kinds.filter(|(_, count)| *count > 0).collect::<BTreeMap<_, _>>(),
+        "faults": validation.faults(),
+        "unexplained_cells": unexplained,
+    })
 }

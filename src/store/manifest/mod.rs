@@ -41,7 +41,7 @@ impl Head {
 }
 
 /// Joins the fields of several objects into one.
-pub(crate) fn joined<const N: usize>(objects: [Value; N]) -> Value {
+pub fn joined<const N: usize>(objects: [Value; N]) -> Value {
     let fields = |object| if let Value::Object(fields) = object { fields } else { Default::default() };
     Value::Object(objects.into_iter().flat_map(fields).collect())
 }
