@@ -1,11 +1,13 @@
 //! Hysteresis: values at which the two passes of a diagram differ.
 
+use serde::Serialize;
+
 use crate::findings::compare::{Compared, Comparison, Kind, TOLERANCE, Values, words_differ};
 use crate::map::bifurcation::{Column, Direction};
 use crate::record::measures::{self, Dimension};
 
-/// Values of the axis at which the motion depends on the direction in which the attractor was followed.
-#[derive(Clone, Debug, PartialEq)]
+/// Values of the axis at which the motion depends on the direction in which the attractor was followed. Manifests have its fields.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hysteresis {
     /// Number of values of the axis.
     pub columns: usize,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::findings::hysteresis::{self, Hysteresis};
+use crate::findings::hysteresis::hysteresis;
 use crate::map::bifurcation::Column;
 use crate::map::plan::count_classes;
 use crate::map::scene::{Along, Scene};
@@ -61,28 +61,11 @@ pub(crate) fn bifurcation(
             },
             "classes": classes.collect::<BTreeMap<_, _>>(),
         }),
-        without_nulls(json!({ "hysteresis": hysteresis::hysteresis(columns).map(describe) })),
+        without_nulls(json!({ "hysteresis": hysteresis(columns) })),
         json!({
             "elapsed_seconds": elapsed,
             "timings": { "integrate": elapsed, "write": writing.as_secs_f64() },
             "files": files,
         }),
     ])
-}
-
-/// Describes the values at which the result depends on the direction of the sweep. `ranges` are the first and the last
-/// value of each group of neighbours; `by_pattern` and `by_quantity` are the numbers of values at which only patterns, or only quantities,
-/// differ.
-fn describe(found: Hysteresis) -> Value {
-    let Hysteresis { columns, differing, ranges, by_pattern, pattern_ranges, by_quantity, quantity_ranges } =
-        found;
-    json!({
-        "columns": columns,
-        "differing": differing,
-        "ranges": ranges,
-        "by_pattern": by_pattern,
-        "pattern_ranges": pattern_ranges,
-        "by_quantity": by_quantity,
-        "quantity_ranges": quantity_ranges,
-    })
 }
