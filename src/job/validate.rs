@@ -271,7 +271,7 @@ fn verdict(dir: &Path, plan: &Plan, validation: &Validation) -> Result<(), JobEr
 fn remedy(plan: &Plan, validation: &Validation) -> String {
     let unexplained = validation.mismatches.iter().filter(|mismatch| mismatch.kind == Kind::Unexplained);
     let differences = unexplained.flat_map(|mismatch| &mismatch.differences);
-    let told = differences.filter(|difference| matches!(difference.field, Field::Class | Field::Status));
+    let told = differences.filter(|difference| [Field::CLASS, Field::STATUS].contains(&difference.field));
     let told: Vec<&Value> = told.map(|difference| &difference.record).collect();
     let is = |value: &str| told.iter().any(|told| **told == Value::Text(value.to_owned()));
     let budget = plan.budget();

@@ -93,6 +93,11 @@ impl<'a> Cell<'a> {
         self
     }
 
+    /// Returns the budget over which a slow approach to a cycle is followed.
+    pub(super) fn long_budget(&self) -> Budget {
+        self.whole_budget(FOLLOWED)
+    }
+
     /// Returns `times` the plan's budget without early stops.
     fn whole_budget(&self, times: u32) -> Budget {
         let mut budget = Budget { early_stop: false, ..self.budget };
@@ -122,11 +127,11 @@ impl<'a> Cell<'a> {
     pub(super) fn followed(&self, periods: u32) -> Record {
         let confirm_chaos = self.budget.confirm_chaos.saturating_add(periods);
         let budget = Budget { early_stop: true, confirm_chaos, quantities: false, ..self.budget };
-        answer(&self.flow, self.law, self.start, &budget, self.halt).record
+        self.within(&budget).record
     }
 
     /// Builds a budget of this number of periods without early stops.
-    fn budget_of(&self, periods: u32) -> Budget {
+    pub(super) fn budget_of(&self, periods: u32) -> Budget {
         let mut budget = Budget { early_stop: false, confirm_chaos: 0, ..self.budget };
         let observed = budget.settings.observed_periods.min(periods / 2);
         budget.settings.observed_periods = observed;
@@ -142,7 +147,7 @@ impl<'a> Cell<'a> {
 
     fn reached(&self, flow: &Flow, law: Law, start: State) -> Answer {
         let answer = answer(flow, law, start, &self.whole_budget(1), self.halt);
-        let followed = || self::answer(flow, law, start, &self.whole_budget(FOLLOWED), self.halt);
+        let followed = || self::answer(flow, law, start, &self.long_budget(), self.halt);
         match classify(&answer.record) {
             Class::Periodic { .. } if status(&answer.record) == Status::Slow => {
                 let later = followed();
@@ -182,37 +187,34 @@ impl<'a> Cell<'a> {
         Some(self.reached(&moved.flow, moved.law, moved.start))
     }
 
-    /// Computes the `k`th perturbed cell over this number of periods.
-    pub(super) fn perturbed_after(&self, k: u64, periods: u32) -> Option<Answer> {
+    /// Computes the `k`th perturbed cell over a budget.
+    pub(super) fn perturbed_within(&self, k: u64, budget: &Budget) -> Option<Answer> {
         let moved = self.perturbed(k)?;
-        Some(answer(&moved.flow, moved.law, moved.start, &self.budget_of(periods), self.halt))
+        Some(answer(&moved.flow, moved.law, moved.start, budget, self.halt))
     }
 
-    /// Computes the `k`th perturbed cell over a multiple of the plan's budget.
-    pub(super) fn perturbed_for_long(&self, k: u64) -> Option<Answer> {
-        let moved = self.perturbed(k)?;
-        Some(answer(&moved.flow, moved.law, moved.start, &self.whole_budget(FOLLOWED), self.halt))
-    }
-
-    /// Computes the cell over a multiple of the plan's budget.
-    pub(super) fn followed_for_long(&self) -> Answer {
-        answer(&self.flow, self.law, self.start, &self.whole_budget(FOLLOWED), self.halt)
+    /// Computes the cell over a budget.
+    pub(super) fn within(&self, budget: &Budget) -> Answer {
+        answer(&self.flow, self.law, self.start, budget, self.halt)
     }
 
     /// Computes averages of the `k`th perturbed cell over the periods that a chaotic record averages.
     pub(super) fn averages(&self, k: u64, periods: u32) -> Option<Record> {
-        let moved = self.perturbed(k)?;
         let mut budget = self.budget_of(periods);
         let from = self.budget.exponent_from().min(periods / 2);
         (budget.settings.transient_periods, budget.settings.observed_periods) = (from, periods - from);
-        Some(answer(&moved.flow, moved.law, moved.start, &budget, self.halt).record)
+        Some(self.perturbed_within(k, &budget)?.record)
+    }
+
+    /// Begins the motion from a state, without limits but the flag.
+    pub(super) fn trajectory(&self, state: State) -> Trajectory<'_, 0> {
+        Trajectory::new(&self.flow, self.law, state).allowing(Allowance::UNLIMITED.until(self.halt))
     }
 
     /// Returns the reference's state after this number of periods, and the states of `count` perturbed cells whose state
     /// is also perturbed after each period.
     pub(super) fn states(&self, count: u64, periods: u32) -> Option<(State, Vec<State>)> {
-        let mut trajectory = Trajectory::<0>::new(&self.flow, self.law, self.start)
-            .allowing(Allowance::UNLIMITED.until(self.halt));
+        let mut trajectory = self.trajectory(self.start);
         (0..periods).try_for_each(|_| trajectory.advance_period(&mut ())).ok()?;
         let moved = (0..count).filter_map(|k| self.perturbed(k)?.state_after(periods));
         Some((trajectory.state(), moved.collect()))
@@ -232,8 +234,7 @@ impl<'a> Cell<'a> {
 
     /// Whether a cycle of `period` periods closes after fewer periods, within the effect of rounding.
     pub(super) fn closes_earlier(&self, state: State, period: u32) -> bool {
-        let mut trajectory =
-            Trajectory::<0>::new(&self.flow, self.law, state).allowing(Allowance::UNLIMITED.until(self.halt));
+        let mut trajectory = self.trajectory(state);
         let mut earlier = f64::INFINITY;
         for n in 1..period {
             if trajectory.advance_period(&mut ()).is_err() {
@@ -266,9 +267,7 @@ impl<'a> Cell<'a> {
     ) -> impl Iterator<Item = Trajectory<'_, N>> {
         (0..TURNS).filter_map(move |k| {
             let mut random = Random::new(self.seed ^ k);
-            let begun = Trajectory::<0>::new(&self.flow, self.law, state)
-                .allowing(Allowance::UNLIMITED.until(self.halt));
-            let mut trajectory = begun.carrying(tangents);
+            let mut trajectory = self.trajectory(state).carrying(tangents);
             for _ in 0..periods {
                 trajectory.advance_period(&mut ()).ok()?;
                 trajectory.perturb(|| share(&mut random, self.resolution));

@@ -16,71 +16,55 @@ use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Budget, Class, Status};
 use rattlemap_dynamics::word::Word;
 
-/// A compared field.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Field {
-    /// The class: periodic, chaotic, undecided or failed.
-    Class,
-    /// The period, if both are periodic.
-    Period,
-    /// The word up to mirror image, if the periods agree.
-    Word,
-    /// The pattern up to mirror image, if the periods agree.
-    Pattern,
-    /// Whether the cycle is its own mirror image, if the periods agree.
-    Symmetric,
-    /// The exponent. For cycles the largest multiplier is compared instead. Otherwise the exponent is compared with wide tolerances.
-    Exponent,
-    /// The attractor of the start in a map of basins, if both are periodic.
-    Attractor,
-    /// Impacts per forcing period.
-    Impacts,
-    /// Fraction of the time spent meshing.
-    Mesh,
-    /// A measured quantity, by its index in the table of [`GROUPS`].
-    Measured(usize),
-    /// How the integration ended.
-    Status,
-    /// Number of integrated forcing periods, which the plan limits.
-    Periods,
-    /// Whether all numbers of the record are finite.
-    Finite,
-    /// Whether the same engine reproduces the record to the bit.
-    Again,
-}
+/// A compared field, by its name in files. This is the record's field name if there is one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field(&'static str);
 
 impl Field {
-    /// Returns all fields with their names, in the order in which they are reported.
-    fn named() -> impl Iterator<Item = (Field, &'static str)> {
-        let before = [
-            (Field::Class, "class"),
-            (Field::Period, "period"),
-            (Field::Word, "word"),
-            (Field::Pattern, "pattern"),
-            (Field::Symmetric, "symmetric"),
-            (Field::Exponent, "lyapunov"),
-            (Field::Attractor, "attractor"),
-            (Field::Impacts, "impacts_per_period"),
-            (Field::Mesh, "mesh_fraction"),
-        ];
-        let measured = GROUPS.iter().enumerate().map(|(index, group)| (Field::Measured(index), group.name));
-        let after = [
-            (Field::Status, "status"),
-            (Field::Periods, "periods_run"),
-            (Field::Finite, "finite"),
-            (Field::Again, "again"),
-        ];
-        before.into_iter().chain(measured).chain(after)
+    /// The class: periodic, chaotic, undecided or failed.
+    pub const CLASS: Field = Field("class");
+    /// The period, if both are periodic.
+    pub const PERIOD: Field = Field("period");
+    /// The word up to mirror image, if the periods agree.
+    pub const WORD: Field = Field("word");
+    /// The pattern up to mirror image, if the periods agree.
+    pub const PATTERN: Field = Field("pattern");
+    /// Whether the cycle is its own mirror image, if the periods agree.
+    pub const SYMMETRIC: Field = Field("symmetric");
+    /// The exponent. For cycles the largest multiplier is compared instead. Otherwise the exponent is compared with wide tolerances.
+    pub const EXPONENT: Field = Field("lyapunov");
+    /// The attractor of the start in a map of basins, if both are periodic.
+    pub const ATTRACTOR: Field = Field("attractor");
+    /// Impacts per forcing period.
+    pub const IMPACTS: Field = Field("impacts_per_period");
+    /// Fraction of the time spent meshing.
+    pub const MESH: Field = Field("mesh_fraction");
+    /// How the integration ended.
+    pub const STATUS: Field = Field("status");
+    /// Number of integrated forcing periods, which the plan limits.
+    pub const PERIODS: Field = Field("periods_run");
+    /// Whether all numbers of the record are finite.
+    pub const FINITE: Field = Field("finite");
+    /// Whether the same engine reproduces the record to the bit.
+    pub const AGAIN: Field = Field("again");
+
+    /// Returns all fields, in the order in which they are reported. A measured quantity has the name of its group.
+    pub fn all() -> impl Iterator<Item = Field> {
+        let motion = [Field::CLASS, Field::PERIOD, Field::WORD, Field::PATTERN, Field::SYMMETRIC];
+        let averages = [Field::EXPONENT, Field::ATTRACTOR, Field::IMPACTS, Field::MESH];
+        let measured = GROUPS.iter().map(|group| Field(group.name));
+        let record = [Field::STATUS, Field::PERIODS, Field::FINITE, Field::AGAIN];
+        motion.into_iter().chain(averages).chain(measured).chain(record)
     }
 
-    /// Returns all fields, in the order in which they are reported.
-    pub fn all() -> Vec<Field> {
-        Field::named().map(|(field, _)| field).collect()
-    }
-
-    /// Returns the name in files, which is the record's field name if there is one.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
-        Field::named().find(|&(field, _)| field == self).map_or("", |(_, name)| name)
+        self.0
+    }
+
+    /// Whether it is a measured quantity.
+    pub(super) fn is_measured(self) -> bool {
+        Group::named(self.0).is_some()
     }
 }
 
@@ -269,22 +253,22 @@ impl Bars<'_> {
         let [ours, theirs] = [record, judge].map(classify);
         let longest = self.budget.longest();
         let mut list = vec![
-            compared(Field::Class, ours.index() == theirs.index(), || texts(ours.name(), theirs.name())),
-            compared(Field::Periods, record.periods_run <= longest, || {
+            compared(Field::CLASS, ours.index() == theirs.index(), || texts(ours.name(), theirs.name())),
+            compared(Field::PERIODS, record.periods_run <= longest, || {
                 (Value::Count(record.periods_run), Value::Count(longest))
             }),
             self.finite(record),
         ];
         if ours.index() == theirs.index() {
             let statuses = [record, judge].map(status);
-            list.push(compared(Field::Status, self.is_same_status(ours, statuses, judge), || {
+            list.push(compared(Field::STATUS, self.is_same_status(ours, statuses, judge), || {
                 texts(statuses[0].name(), statuses[1].name())
             }));
         }
         match (ours, theirs) {
             (Class::Periodic { period: ours }, Class::Periodic { period: theirs }) => {
                 let counts = || (Value::Count(ours), Value::Count(theirs));
-                list.push(compared(Field::Period, ours == theirs, counts));
+                list.push(compared(Field::PERIOD, ours == theirs, counts));
                 list.extend(self.compare_labels(record, judge));
                 if ours == theirs {
                     self.compare_cycle(record, answer, f64::from(ours), &mut list);
@@ -305,7 +289,7 @@ impl Bars<'_> {
         let labels = self.labels?;
         let [ours, theirs] = [record, judge].map(|record| labels.of(record));
         let shown = |label: Option<u16>| Value::Text(label.map_or("none of them".into(), |n| n.to_string()));
-        Some(compared(Field::Attractor, ours == theirs, || (shown(ours), shown(theirs))))
+        Some(compared(Field::ATTRACTOR, ours == theirs, || (shown(ours), shown(theirs))))
     }
 
     /// Whether two statuses of one class agree. Lanes in f32 report `slow` at distances above 1e-4 from the cycle, and other engines above
@@ -341,7 +325,7 @@ impl Bars<'_> {
             let (name, value) = found.unwrap_or_default();
             (Value::Text(format!("{name} = {value}")), Value::Text("a finite number".into()))
         };
-        compared(Field::Finite, found.is_none(), shown)
+        compared(Field::FINITE, found.is_none(), shown)
     }
 
     /// Whether a record agrees in all fields.
@@ -352,18 +336,18 @@ impl Bars<'_> {
     fn compare_cycle(&self, record: &Record, answer: &Answer, period: f64, list: &mut Vec<Compared>) {
         let judge = &answer.record;
         let both = record.valid & judge.valid;
-        list.extend(answer.word.compare(Field::Word, record.spelling().as_ref()));
-        list.extend(answer.pattern.compare(Field::Pattern, record.pattern().as_ref()));
+        list.extend(answer.word.compare(Field::WORD, record.spelling().as_ref()));
+        list.extend(answer.pattern.compare(Field::PATTERN, record.pattern().as_ref()));
         if both & valid::SYMMETRIC != 0 {
             let flags = [record, judge].map(|side| side.symmetric != 0);
             let shown = || (Value::Flag(flags[0]), Value::Flag(flags[1]));
-            list.push(compared(Field::Symmetric, flags[0] == flags[1], shown));
+            list.push(compared(Field::SYMMETRIC, flags[0] == flags[1], shown));
         }
         let logs = [record, judge].map(|side| side.lyapunov * period * self.forcing_period);
         let is_same = self.is_same_multiplier(logs[0], logs[1], period);
         self.push(
             list,
-            (Field::Exponent, valid::LYAPUNOV),
+            (Field::EXPONENT, valid::LYAPUNOV),
             [record, judge].map(|r| r.lyapunov),
             both,
             is_same,
@@ -396,7 +380,7 @@ impl Bars<'_> {
         let bar = ERRORS * std::f64::consts::SQRT_2 * own + CHAOS_BARS[0] / self.forcing_period;
         let is_same = is_within(apart(exponents[0], exponents[1]), bar);
         let both = record.valid & judge.valid;
-        self.push(list, (Field::Exponent, valid::LYAPUNOV), exponents, both, is_same);
+        self.push(list, (Field::EXPONENT, valid::LYAPUNOV), exponents, both, is_same);
         let impacts = CHAOS_BARS[1] * judge.impacts_per_period + 1.0;
         self.push_averages(list, record, judge, [impacts, CHAOS_BARS[2]]);
         self.push_measured(list, record, judge, |group| {
@@ -407,8 +391,8 @@ impl Bars<'_> {
     fn push_averages(&self, list: &mut Vec<Compared>, record: &Record, judge: &Record, bars: [f64; 2]) {
         let both = record.valid & judge.valid;
         let of = [
-            ((Field::Impacts, valid::IMPACTS), [record, judge].map(|side| side.impacts_per_period)),
-            ((Field::Mesh, valid::MESH), [record, judge].map(|side| side.mesh_fraction)),
+            ((Field::IMPACTS, valid::IMPACTS), [record, judge].map(|side| side.impacts_per_period)),
+            ((Field::MESH, valid::MESH), [record, judge].map(|side| side.mesh_fraction)),
         ];
         for ((field, values), bar) in of.into_iter().zip(bars) {
             self.push(list, field, values, both, is_within(apart(values[0], values[1]), bar));
@@ -437,13 +421,13 @@ impl Bars<'_> {
         is_same: impl Fn(&Group) -> bool,
     ) {
         let both = record.valid & judge.valid;
-        for (place, group) in GROUPS.iter().enumerate().filter(|(_, group)| both & group.bit != 0) {
+        for group in GROUPS.iter().filter(|group| both & group.bit != 0) {
             let values = || {
                 let pairs = group.measures().map(|m| [record, judge].map(|side| side.measures[m.place]));
                 let [ours, theirs] = pairs.max_by(farther_apart).unwrap_or_default();
                 (Value::Number(ours), Value::Number(theirs))
             };
-            list.push(compared(Field::Measured(place), is_same(group), values));
+            list.push(compared(Field(group.name), is_same(group), values));
         }
     }
 

@@ -151,11 +151,12 @@ fn is_too_short(cell: &Cell<'_>, claim: &Record, truth: &Answer, agrees: &dyn Fn
             is_undecided || status(claim) == Status::Slow && is_multiple(cell, &open, answer);
         claims_nothing && !cell.bars.is_decisive(&answer.record)
     };
-    let stopped = || (0..MANY_PERTURBED).filter_map(|k| cell.perturbed_after(k, claim.periods_run));
-    let later = || (0..PERTURBED).filter_map(|k| cell.perturbed_for_long(k));
+    let (until, long) = (cell.budget_of(claim.periods_run), cell.long_budget());
+    let stopped = || (0..MANY_PERTURBED).filter_map(|k| cell.perturbed_within(k, &until));
+    let later = || (0..PERTURBED).filter_map(|k| cell.perturbed_within(k, &long));
     // A search may find a cycle long before the motion has reached it.
     let arrives = || {
-        let answer = cell.followed_for_long();
+        let answer = cell.within(&long);
         let arrived = Record { status: answer.record.status, ..claim.clone() };
         matches!(classify(&answer.record), Class::Periodic { .. }) && cell.bars.agree(&arrived, &answer)
     };

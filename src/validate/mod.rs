@@ -299,14 +299,13 @@ pub fn replay_until(
         })
         .collect();
     let again = again(&mut replayed, is_exact);
-    let agreement = Field::all().into_iter().map(|field| {
+    let agreement = Field::all().map(|field| {
         let of_field = || replayed.iter().flat_map(|cell| &cell.fields).filter(move |(f, _)| *f == field);
         let agreeing = of_field().filter(|(_, differs)| differs.is_none()).count();
         Agreement { field, compared: of_field().count(), agreeing }
     });
     // Measured quantities that the scene does not request are not listed.
-    let is_listed =
-        |agreement: &Agreement| agreement.compared > 0 || !matches!(agreement.field, Field::Measured(_));
+    let is_listed = |agreement: &Agreement| agreement.compared > 0 || !agreement.field.is_measured();
     let agreement = agreement.filter(is_listed).collect();
     let changes: Vec<half_mesh::Changes> = replayed.iter().filter_map(|cell| cell.half_mesh).collect();
     let chaos: Vec<chaos::Differences> = replayed.iter().filter_map(|cell| cell.chaos).collect();
@@ -449,7 +448,7 @@ fn again(replayed: &mut [Replayed], is_exact: bool) -> [usize; 2] {
         for cell in replayed {
             let Some(is_same) = cell.again else { continue };
             let values = || (Value::Text("another record".into()), Value::Text("the engine's".into()));
-            cell.fields.push(compare::compared(Field::Again, is_same, values));
+            cell.fields.push(compare::compared(Field::AGAIN, is_same, values));
             if !is_same {
                 cell.kind = Some(Kind::Unexplained);
             }

@@ -10,7 +10,7 @@ use crate::record::classify::{classify, status};
 use crate::record::distance::apart;
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::State;
-use rattlemap_dynamics::motion::{Allowance, GapEvent, Observer, States, Trajectory};
+use rattlemap_dynamics::motion::{GapEvent, Observer, States};
 use rattlemap_dynamics::orbit::{Class, Status};
 use rattlemap_dynamics::stability::{StrobeMap, refine};
 
@@ -22,9 +22,7 @@ pub(super) fn on_its_cycle(cell: &Cell<'_>, record: &Record) -> Option<(Record, 
     if record.valid & needed != needed || !record.strobe().iter().all(|x| x.is_finite()) {
         return None;
     }
-    let seed = Trajectory::<0>::new(&cell.flow, cell.law, record.strobe())
-        .allowing(Allowance::UNLIMITED.until(cell.halt));
-    let cycle = refine(&seed, StrobeMap::Periods(period))?;
+    let cycle = refine(&cell.trajectory(record.strobe()), StrobeMap::Periods(period))?;
     let is_slow = status(record) == Status::Slow;
     let reach = if is_slow { rules::recurrence_distance() } else { rules::ON_CYCLE };
     let distance = cell.apart(&record.strobe(), &cycle.state);
@@ -59,8 +57,7 @@ fn is_within_scatter(cell: &Cell<'_>, state: State, log_multiplier: f64, period:
 
 /// Whether an event of a cycle lies at phase 0 within the engine's resolution.
 pub(super) fn meets_strobe(cell: &Cell<'_>, state: State, period: u32) -> bool {
-    let mut trajectory =
-        Trajectory::<0>::new(&cell.flow, cell.law, state).allowing(Allowance::UNLIMITED.until(cell.halt));
+    let mut trajectory = cell.trajectory(state);
     let mut met = Times::default();
     if (0..period).any(|_| trajectory.advance_period(&mut met).is_err()) {
         return false;

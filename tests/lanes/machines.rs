@@ -196,7 +196,7 @@ fn maps_of_machines_have_the_symmetry_and_the_quantities_of_the_reference() {
             let period = plan.oscillator(plan.cell(id as u32).flow).period();
             let mut differences = differences(found, expected, Precision::F32, period, plan.budget());
             // Lanes may settle in another time.
-            differences.retain(|one| one.field != Field::Status);
+            differences.retain(|one| one.field != Field::STATUS);
             assert!(differences.is_empty(), "cell {id}: {differences:?}");
             if found.valid & valid::SYMMETRIC != 0 {
                 symmetric[found.symmetric as usize] += 1;
