@@ -4,7 +4,6 @@
 pub mod check;
 pub mod compare;
 pub mod devices;
-pub mod dry_run;
 pub mod engine_choice;
 pub mod environment;
 pub mod error;

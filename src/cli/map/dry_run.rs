@@ -10,12 +10,19 @@ use crate::cli::console::Console;
 use crate::cli::failure::Failure;
 use crate::cli::say::{path, quoted};
 use crate::cli::stdout::{print, print_json};
-use crate::job::dry_run::DryRun;
-use crate::job::forecast::Forecast;
-use crate::job::map::MapJob;
-use crate::job::processor;
-use crate::job::size::Free;
+use crate::job::engine_choice::EngineKind;
+use crate::job::error::JobError;
+use crate::job::forecast::{self, Forecast};
+use crate::job::map::{MapJob, OpenMap};
+use crate::job::observer::Observer;
+use crate::job::size::{Free, Size};
+use crate::job::{model_engine, processor};
 use crate::map::plan::Plan;
+use crate::map::sweep::SweepError;
+use crate::store::folder::{Folder, FolderError};
+use crate::store::map;
+use crate::store::record_file::{Identity, RECORDS};
+use crate::store::run_records::{self, Work};
 use crate::text::size::bytes;
 
 /// Estimates memory, disk space and time, and prints them.
@@ -27,72 +34,143 @@ pub(super) fn run(
     free: Free,
     console: Arc<Console>,
 ) -> Result<(), Failure> {
-    let dry = DryRun::of(job, plan, out, arguments.run.force, free, console)?;
-    if arguments.json {
-        return print_json(&object(&dry, job, plan, out));
+    let job = MapJob { engine: job.engine_request(Some(out)), ..job.clone() };
+    let dry = DryRun::of(&job, plan, out, arguments.run.force, free, console)?;
+    if arguments.json { print_json(&dry.object()) } else { print(&dry.text()) }
+}
+
+/// A map that is not computed, and what it needs.
+struct DryRun<'a> {
+    job: &'a MapJob<'a>,
+    plan: &'a Plan,
+    out: &'a Path,
+    /// Whether the folder contains files, and the run needs `--resume` or `--force`.
+    is_taken: bool,
+    /// Number of runs of the map or shard.
+    runs: usize,
+    /// Number of runs whose records are already in the folder.
+    stored: usize,
+    opened: OpenMap<'a>,
+    size: Size,
+    free: Free,
+    forecast: Forecast,
+}
+
+impl<'a> DryRun<'a> {
+    /// Opens the engine and computes a sample of the cells, whose records are discarded. Notes and warnings about the
+    /// engine go to the console.
+    ///
+    /// # Errors
+    /// [`JobError`] if the folder cannot be used, or the engine cannot be opened or fails.
+    fn of(
+        job: &'a MapJob<'a>,
+        plan: &'a Plan,
+        out: &'a Path,
+        force: bool,
+        free: Free,
+        console: Arc<Console>,
+    ) -> Result<DryRun<'a>, JobError> {
+        if job.resume {
+            run_records::require_records(out)?;
+        }
+        let is_taken = match Folder::check(out, force || job.resume, map::names_of(job.scene)) {
+            Err(FolderError::NotEmpty { .. }) => true,
+            checked => checked.map(|()| false)?,
+        };
+        if let Some(warning) = forecast::long_cells(plan) {
+            console.warn(&warning);
+        }
+        let mut opened = job.open(plan, None, console)?;
+        let engine = &mut opened.engine;
+        let records = out.join(RECORDS);
+        let stored = if job.resume && records.is_file() {
+            let identity =
+                Identity::new(engine.name(), engine.precision(), &engine.device(), job.scene.identity())
+                    .of_coordinates(job.scene.coordinates())
+                    .of_shard(job.shard);
+            Work::new(plan, job.shard, false).read(&records, &identity)?.count
+        } else {
+            0
+        };
+        let runs = job.run_count(plan);
+        let forecast = Forecast::of(plan, engine, runs.saturating_sub(stored)).map_err(SweepError::Engine)?;
+        let size = Size::of(job.scene, job.shard);
+        Ok(DryRun { job, plan, out, is_taken, runs, stored, opened, size, free, forecast })
     }
-    print(&text(&dry, job, plan, out))
-}
 
-fn text(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> String {
-    let counts: Vec<String> = job.scene.axes().iter().map(|axis| axis.count().to_string()).collect();
-    let grid = if plan.is_list() { String::new() } else { format!("{} = ", counts.join(" x ")) };
-    let unit = plan.unit();
-    let starts = match plan.start_count() {
-        1 => String::new(),
-        starts => format!(", {starts} starts each: {} runs", plan.run_count()),
-    };
-    let shard =
-        job.shard.map_or(String::new(), |shard| format!("; {} {unit} of them in shard {shard}", dry.runs));
-    let stored =
-        if dry.stored > 0 { format!("; {} {unit} are stored already", dry.stored) } else { String::new() };
-    let device = if dry.device_memory.is_some() { quoted(&dry.device) } else { processor::described() };
-    let reason = if dry.reason.is_empty() { String::new() } else { format!(": {}", dry.reason) };
-    let on_device =
-        dry.device_memory.map_or(String::new(), |most| format!(", and up to {} on the device", bytes(most)));
-    let free = |free: Option<u64>| free.map_or(String::new(), |free| format!("; {} are free", bytes(free)));
-    [
-        format!("cells    {grid}{}{starts}{shard}{stored}", plan.cell_count()),
-        format!("engine   {} ({}) on {device}{reason}", dry.engine, dry.precision),
-        format!("model    {}", dry.model),
-        format!("memory   about {}{on_device}{}", bytes(dry.host_memory), free(dry.free.memory)),
-        format!("disk     about {}{} for {}", bytes(dry.disk), free(dry.free.disk), path(out)),
-        format!("time     {}", time(&dry.forecast, dry.is_adaptive)),
-        format!(
-            "         predicted from {} cells; opening the engine ({}) and writing tables and figures are not included",
-            dry.forecast.sampled,
-            seconds(dry.open_seconds)
-        ),
-        match dry.is_taken {
-            true => "folder   not empty: the run needs --resume or --force; nothing was written".to_owned(),
-            false => "nothing was written".to_owned(),
-        },
-    ]
-    .join("\n")
-}
+    /// Memory of the host, in bytes.
+    fn host_memory(&self) -> u64 {
+        let is_on_device = self.opened.engine.device_bytes().is_some();
+        self.size.memory(if is_on_device { EngineKind::Gpu } else { EngineKind::Cpu })
+    }
 
-fn object(dry: &DryRun, job: &MapJob<'_>, plan: &Plan, out: &Path) -> Value {
-    json!({
-        "folder": out.to_string_lossy(),
-        "needs_resume_or_force": dry.is_taken,
-        "cells": plan.cell_count(),
-        "runs": dry.runs,
-        "shard": job.shard,
-        "kept": dry.stored,
-        "engine": dry.engine,
-        "precision": dry.precision,
-        "device": dry.device,
-        "why": dry.reason,
-        "memory_bytes": { "host": dry.host_memory, "free": dry.free.memory, "device": dry.device_memory },
-        "disk_bytes": { "needed": dry.disk, "free": dry.free.disk },
-        "seconds": {
-            "open": dry.open_seconds,
-            "integrate": dry.forecast.seconds,
-            "interval": dry.forecast.interval,
-        },
-        "is_upper_bound": dry.is_upper_bound(),
-        "sampled": dry.forecast.sampled,
-    })
+    fn text(&self) -> String {
+        let DryRun { job, plan, out, runs, stored, size, forecast, .. } = self;
+        let OpenMap { engine, reason, opening, .. } = &self.opened;
+        let counts: Vec<String> = job.scene.axes().iter().map(|axis| axis.count().to_string()).collect();
+        let grid = if plan.is_list() { String::new() } else { format!("{} = ", counts.join(" x ")) };
+        let unit = plan.unit();
+        let starts = match plan.start_count() {
+            1 => String::new(),
+            starts => format!(", {starts} starts each: {} runs", plan.run_count()),
+        };
+        let shard =
+            job.shard.map_or(String::new(), |shard| format!("; {runs} {unit} of them in shard {shard}"));
+        let stored =
+            if *stored > 0 { format!("; {stored} {unit} are stored already") } else { String::new() };
+        let most = engine.device_bytes();
+        let device = if most.is_some() { quoted(engine.device()) } else { processor::described() };
+        let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
+        let on_device =
+            most.map_or(String::new(), |most| format!(", and up to {} on the device", bytes(most)));
+        let free =
+            |free: Option<u64>| free.map_or(String::new(), |free| format!("; {} are free", bytes(free)));
+        [
+            format!("cells    {grid}{}{starts}{shard}{stored}", plan.cell_count()),
+            format!("engine   {} ({}) on {device}{reason}", engine.name(), engine.precision()),
+            format!("model    {}", model_engine::described(&plan.oscillator(0))),
+            format!("memory   about {}{on_device}{}", bytes(self.host_memory()), free(self.free.memory)),
+            format!("disk     about {}{} for {}", bytes(size.disk), free(self.free.disk), path(out)),
+            format!("time     {}", time(forecast, plan.refine().is_some())),
+            format!(
+                "         predicted from {} cells; opening the engine ({}) and writing tables and figures are not included",
+                forecast.sampled,
+                seconds(opening.as_secs_f64())
+            ),
+            match self.is_taken {
+                true => "folder   not empty: the run needs --resume or --force; nothing was written".to_owned(),
+                false => "nothing was written".to_owned(),
+            },
+        ]
+        .join("\n")
+    }
+
+    fn object(&self) -> Value {
+        let DryRun { free, forecast, .. } = self;
+        let OpenMap { engine, reason, opening, .. } = &self.opened;
+        json!({
+            "folder": self.out.to_string_lossy(),
+            "needs_resume_or_force": self.is_taken,
+            "cells": self.plan.cell_count(),
+            "runs": self.runs,
+            "shard": self.job.shard,
+            "kept": self.stored,
+            "engine": engine.name(),
+            "precision": engine.precision(),
+            "device": engine.device(),
+            "why": reason,
+            "memory_bytes": { "host": self.host_memory(), "free": free.memory, "device": engine.device_bytes() },
+            "disk_bytes": { "needed": self.size.disk, "free": free.disk },
+            "seconds": {
+                "open": opening.as_secs_f64(),
+                "integrate": forecast.seconds,
+                "interval": forecast.interval,
+            },
+            // An adaptive map integrates fewer cells than predicted, if the whole sample ended in time.
+            "is_upper_bound": self.plan.refine().is_some() && forecast.interval.is_some(),
+            "sampled": forecast.sampled,
+        })
+    }
 }
 
 /// Formats the predicted time. It is an upper bound for an adaptive map, which integrates fewer cells.
