@@ -49,7 +49,7 @@ pub fn run(counts: [u32; 2], all: bool, engine: EngineRequest, out: &Path) -> Re
     let opened = phase::run("open", &mut phases, || job.open(&plan, Some(&folder), Arc::new(())))?;
     let mut run = phase::run("begin", &mut phases, || opened.begin())?;
     phase::run("integrate", &mut phases, || run.integrate(&Arc::default()))?;
-    let traffic = match run.engine() {
+    let traffic = match &run.open.engine {
         Engine::Gpu(gpu) => Some(gpu.traffic()),
         _ => None,
     };

@@ -73,9 +73,7 @@ class MapResult(TypedDict):
     columns: dict[str, npt.NDArray[Any]]
     texts: list[str]
     attractors: str | None
-    reason: str
     warnings: list[str]
-    files: list[str]
 
 def map(
     scene: Scene,
@@ -95,7 +93,6 @@ def shard(
     engine: str,
     precision: str | None,
     out: str,
-    resume: bool = ...,
     threads: int | None = ...,
     progress: _Report = ...,
     adapter: str | None = ...,
@@ -109,7 +106,7 @@ def check_shards(
     out: str | None = ...,
     force: bool = ...,
 ) -> None: ...
-def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ..., progress: _Report = ...) -> MapResult: ...
+def merge(parts: list[str], out: str, force: bool = ..., writes: bool = ...) -> MapResult: ...
 
 def bifurcation(scene: Scene, progress: _Report = ...) -> tuple[str, str, str]: ...
 

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rattlemap::show::layers::{SharedColors, shared_colors};
+use rattlemap::store::folder::Folder;
 use rattlemap::store::in_memory;
 
 use crate::arrays::columns;
@@ -17,10 +18,7 @@ use crate::worker;
 /// A map for Python.
 pub(crate) struct MapResult {
     pub(crate) map: in_memory::Map,
-    /// Reason for the choice of the engine.
-    pub(crate) reason: String,
     pub(crate) warnings: Vec<String>,
-    pub(crate) files: Vec<String>,
 }
 
 impl MapResult {
@@ -31,9 +29,7 @@ impl MapResult {
         dict.set_item("columns", columns(py, self.map.columns)?)?;
         dict.set_item("texts", self.map.texts)?;
         dict.set_item("attractors", self.map.attractors)?;
-        dict.set_item("reason", self.reason)?;
         dict.set_item("warnings", self.warnings)?;
-        dict.set_item("files", self.files)?;
         Ok(dict)
     }
 }
@@ -64,12 +60,12 @@ pub(crate) fn map<'py>(
     let result = worker::run(py, progress, move |watch| {
         task.compute(watch, |_, run, mut warnings| {
             let map = run.finish();
-            let (files, reason) = (map.write()?, map.reason().to_owned());
-            let removed = map.removed();
+            map.write()?;
+            let removed = map.run.open.folder.map_or_else(Vec::new, Folder::removed);
             if resume && !removed.is_empty() {
                 warnings.push(format!("removed files of the earlier run: {}", removed.join(", ")));
             }
-            Ok(MapResult { map: map.in_memory()?, reason, warnings, files })
+            Ok(MapResult { map: map.in_memory()?, warnings })
         })
     })?;
     result.into_dict(py)

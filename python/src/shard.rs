@@ -12,7 +12,7 @@ use rattlemap::map::plan::Plan;
 use rattlemap::map::shard::Shard;
 use rattlemap::store;
 use rattlemap::store::folder::Folder;
-use rattlemap::store::merge::{MergeError, Parts, Progress};
+use rattlemap::store::merge::{MergeError, Parts};
 use rayon::ThreadPoolBuilder;
 
 use crate::map::MapResult;
@@ -59,10 +59,10 @@ fn shard_request(
     Ok((shard, request))
 }
 
-/// Computes shard `index` of `count`, counted from 1, into the folder `out`, like `map --shard`. With `resume` it continues from
-/// the records in the folder. The CPU engine uses `threads` threads, by default all. Returns the files' names.
+/// Computes shard `index` of `count`, counted from 1, into the folder `out`, like `map --shard`. The CPU engine
+/// uses `threads` threads, by default all. Returns the files' names.
 #[pyfunction]
-#[pyo3(signature = (scene, index, count, engine, precision, out, resume=false, threads=None, progress=None, adapter=None))]
+#[pyo3(signature = (scene, index, count, engine, precision, out, threads=None, progress=None, adapter=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 #[pyo3(name = "shard")]
 pub(crate) fn of_map<'py>(
@@ -73,7 +73,6 @@ pub(crate) fn of_map<'py>(
     engine: &str,
     precision: Option<&str>,
     out: PathBuf,
-    resume: bool,
     threads: Option<usize>,
     progress: Option<&Bound<'py, PyAny>>,
     adapter: Option<&str>,
@@ -84,7 +83,7 @@ pub(crate) fn of_map<'py>(
         sets: scene.sets.clone(),
         engine,
         shard: Some(shard),
-        out: Some(Out { path: out, force: false, resume }),
+        out: Some(Out { path: out, force: false, resume: false }),
     };
     task.check()?;
     // 0 means as many threads as the machine has.
@@ -98,17 +97,16 @@ pub(crate) fn of_map<'py>(
 /// Combines the shards of a map, in any order, like `rattlemap merge`. The folder `out` receives the records, and with
 /// `writes` all other files of a map.
 #[pyfunction]
-#[pyo3(signature = (parts, out, force=false, writes=true, progress=None))]
+#[pyo3(signature = (parts, out, force=false, writes=true))]
 pub(crate) fn merge<'py>(
     py: Python<'py>,
     parts: Vec<PathBuf>,
     out: PathBuf,
     force: bool,
     writes: bool,
-    progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = Out { path: out, force, resume: false };
-    worker::run(py, progress, move |watch| gather(&parts, out, writes, watch))?.into_dict(py)
+    worker::run(py, None, move |watch| gather(&parts, out, writes, watch))?.into_dict(py)
 }
 
 fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Option<MapResult>, Problem> {
@@ -118,15 +116,13 @@ fn gather(parts: &[PathBuf], out: Out, writes: bool, watch: &Watch) -> Result<Op
     // A folder without results may be replaced. A run that was killed at its start leaves one.
     let force = out.force || !Folder::holds_results(&out.path);
     let folder = Out { force, ..out }.open(parts.scene(), watch)?;
-    let continues = |Progress { done, of }| {
-        watch.set_progress(done, of);
-        !watch.is_halted()
-    };
-    let gathered = match parts.gather(&folder, continues) {
+    let gathered = match parts.gather(&folder, |_| !watch.is_halted()) {
         Err(MergeError::Stopped) => return Ok(None),
         gathered => gathered?,
     };
     let map = gathered.in_memory()?;
-    let files = if writes { gathered.write(&folder)?.files } else { Vec::new() };
-    Ok(Some(MapResult { map, reason: String::new(), warnings: Vec::new(), files }))
+    if writes {
+        gathered.write(&folder)?;
+    }
+    Ok(Some(MapResult { map, warnings: Vec::new() }))
 }

@@ -21,8 +21,7 @@ def test_all_shards_are_the_map(tmp_path: Path) -> None:
         _native.shard(scene, index, 3, "cpu", None, part)
     with pytest.raises(rm.FolderError, match="2/3"):
         _native.merge(parts[::2], str(tmp_path / "all"))
-    result = _native.merge(parts[::-1], str(tmp_path / "all"))
-    assert "cells.npy" in result["files"]
+    _native.merge(parts[::-1], str(tmp_path / "all"))
     assert_same(rm.map(model, **axes, engine="cpu"), rm.open(tmp_path / "all"), (*TIMES, "processor", "shards"))
 
 

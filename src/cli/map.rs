@@ -105,7 +105,7 @@ fn compute(
     interrupt.ends_at_once(restart.text(run.done()), || {});
     match arguments.shard {
         Some(_) => finish_shard(&run, folder.path(), arguments, console),
-        None => finish_map(&run.finish(), clock, folder.path(), arguments, console),
+        None => finish_map(&run.finish(), clock, folder, arguments, console),
     }
 }
 
@@ -136,7 +136,7 @@ fn integrate(
 fn finish_map(
     map: &ComputedMap<'_>,
     clock: Instant,
-    folder: &Path,
+    folder: &Folder,
     arguments: &Map,
     console: &Console,
 ) -> Result<(), Failure> {
@@ -152,13 +152,13 @@ fn finish_map(
         .collect();
     console.finish(&format!(
         "{}{without_effect}\n{}: {}",
-        summary::map(&cells, &run, map.lane_steps(), finishing.as_secs_f64())
-            + &summary::times(&run, finishing, map.writing_times()),
-        say::path(folder),
+        summary::map(&cells, &run, map.run.open.engine.lane_steps(), finishing.as_secs_f64())
+            + &summary::times(&run, finishing, folder.writing_times()),
+        say::path(folder.path()),
         files.join(", ")
     ));
     if arguments.json {
-        print_json(&store::map_json::object(folder, &files, &cells, &run, writing))?;
+        print_json(&store::map_json::object(folder.path(), &files, &cells, &run, writing))?;
     }
     let all_failed = cells.classes().all(|class| class == Class::Failed);
     fail_if(all_failed, "every cell failed; the status column says why")

@@ -1,6 +1,5 @@
 //! Computes a map or a shard of one: opens the engine, creates or resumes the record file, integrates, finishes.
 
-use std::collections::BTreeMap;
 use std::panic;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -177,7 +176,8 @@ pub fn require_engine(shard: Option<Shard>, kind: EngineKind) -> Result<(), JobE
 pub struct OpenMap<'p> {
     job: &'p MapJob<'p>,
     plan: &'p Plan,
-    folder: Option<&'p Folder>,
+    /// The folder; none for a map in memory.
+    pub folder: Option<&'p Folder>,
     observer: Arc<dyn Observer>,
     /// The engine.
     pub engine: Engine<'p>,
@@ -214,7 +214,8 @@ impl<'p> OpenMap<'p> {
 
 /// A map, or a shard of one, that is being computed.
 pub struct MapRun<'p> {
-    open: OpenMap<'p>,
+    /// The map with its engine.
+    pub open: OpenMap<'p>,
     device: String,
     processor: String,
     work: Work<'p>,
@@ -225,16 +226,6 @@ pub struct MapRun<'p> {
 }
 
 impl<'p> MapRun<'p> {
-    /// Reason for the choice of the engine. Empty if the request left no choice.
-    pub fn reason(&self) -> &str {
-        &self.open.reason
-    }
-
-    /// The engine.
-    pub fn engine(&self) -> &Engine<'p> {
-        &self.open.engine
-    }
-
     /// Number of runs that are done.
     pub fn done(&self) -> usize {
         self.done
@@ -243,11 +234,6 @@ impl<'p> MapRun<'p> {
     /// Whether stored records were damaged.
     pub fn is_damaged(&self) -> bool {
         self.records.as_ref().is_some_and(|records| records.damage().is_some())
-    }
-
-    /// Number of runs that were stored before this call of the program.
-    pub fn resumed(&self) -> usize {
-        self.records.as_ref().map_or(0, RunRecords::resumed)
     }
 
     /// Computes the remaining runs. A thread of its own stores their records. Returns false if `halt` was raised before the
@@ -332,14 +318,20 @@ impl<'p> MapRun<'p> {
             device: &self.device,
             commit: OWN_COMMIT,
         };
-        Run {
+        let run = Run {
             planning: self.open.plan.planning,
             opening: *opening,
             elapsed: self.elapsed,
-            storing: self.records.as_ref().map_or(Duration::ZERO, RunRecords::storing),
-            elapsed_before: self.records.as_ref().map_or(Duration::ZERO, RunRecords::elapsed_before),
-            resumed_cells: self.resumed(),
             ..Run::new(provenance, job.sets, &self.processor).on(engine)
+        };
+        match &self.records {
+            None => run,
+            Some(records) => Run {
+                storing: records.storing,
+                elapsed_before: records.elapsed_before,
+                resumed_cells: records.resumed,
+                ..run
+            },
         }
     }
 
@@ -364,7 +356,8 @@ impl<'p> MapRun<'p> {
 
 /// A map whose cells are all computed.
 pub struct ComputedMap<'p> {
-    run: MapRun<'p>,
+    /// The run that computed them.
+    pub run: MapRun<'p>,
     survey: Survey,
     without_effect: Vec<String>,
 }
@@ -382,16 +375,6 @@ impl ComputedMap<'_> {
         Run { without_effect: self.without_effect.clone(), ..self.run.description() }
     }
 
-    /// Reason for the choice of the engine. Empty if the request left no choice.
-    pub fn reason(&self) -> &str {
-        self.run.reason()
-    }
-
-    /// Integration steps of all lanes. None for the CPU engine, which has no fixed steps.
-    pub fn lane_steps(&self) -> Option<u64> {
-        self.run.open.engine.lane_steps()
-    }
-
     /// Writes the files that the scene lists, if there is a folder. Returns their names.
     ///
     /// # Errors
@@ -399,16 +382,6 @@ impl ComputedMap<'_> {
     pub fn write(&self) -> Result<Vec<String>, OutputError> {
         let Some(folder) = self.run.open.folder else { return Ok(Vec::new()) };
         store::map::write(folder, &self.cells(), &self.description())
-    }
-
-    /// Names of results of an earlier run that were removed from the folder and not written again.
-    pub fn removed(&self) -> Vec<String> {
-        self.run.open.folder.map_or_else(Vec::new, Folder::removed)
-    }
-
-    /// Time that it took to write each file; they are written side by side.
-    pub fn writing_times(&self) -> BTreeMap<String, Duration> {
-        self.run.open.folder.map_or_else(BTreeMap::new, Folder::writing_times)
     }
 
     /// Returns the manifest and the columns of the map.

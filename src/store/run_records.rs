@@ -113,12 +113,15 @@ pub fn open_folder(out: &Path, scene: &Scene, force: bool, resume: bool) -> Resu
 pub struct RunRecords<'f> {
     file: RecordFile,
     folder: &'f Folder,
-    resumed: usize,
+    /// Number of records of earlier runs.
+    pub resumed: usize,
     /// Unit of the counts: cells or runs.
     unit: &'static str,
-    elapsed_before: Duration,
+    /// Time that earlier runs spent.
+    pub elapsed_before: Duration,
     clock: Instant,
-    storing: Duration,
+    /// Time in which this run stored records.
+    pub storing: Duration,
 }
 
 impl<'f> RunRecords<'f> {
@@ -209,11 +212,6 @@ impl<'f> RunRecords<'f> {
         self.file.count()
     }
 
-    /// Number of records of earlier runs.
-    pub fn resumed(&self) -> usize {
-        self.resumed
-    }
-
     /// Describes damage to the records of earlier runs, if there is any.
     pub fn damage(&self) -> Option<String> {
         let unit = self.unit;
@@ -221,18 +219,8 @@ impl<'f> RunRecords<'f> {
         Some(format!("{}: {damage}; {count} {unit} are kept, the others are computed again", path.display()))
     }
 
-    /// Time that earlier runs spent.
-    pub fn elapsed_before(&self) -> Duration {
-        self.elapsed_before
-    }
-
-    /// Time in which this run stored records.
-    pub fn storing(&self) -> Duration {
-        self.storing
-    }
-
     /// Time since this run began.
-    pub fn elapsed(&self) -> Duration {
+    fn elapsed(&self) -> Duration {
         self.clock.elapsed()
     }
 }
