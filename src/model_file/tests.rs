@@ -81,9 +81,15 @@ fn read(text: &str) -> FileModel {
 fn check_refusals(text: &str, cases: &str) {
     for [old, new, expected] in test_cases(cases) {
         assert!(text.contains(&old), "{old:?} is not in the model");
-        let message = FileModel::parse(&text.replacen(&old, &new, 1), "m.toml").expect_err(&new).to_string();
-        assert!(message.contains(&expected), "{new}: expected {expected:?} in: {message}");
+        check_refusal(&text.replacen(&old, &new, 1), &expected);
     }
+}
+
+/// Checks that the message for a text contains a part.
+#[track_caller]
+fn check_refusal(text: &str, expected: &str) {
+    let message = FileModel::parse(text, "m.toml").expect_err(expected).to_string();
+    assert!(message.contains(expected), "expected {expected:?} in: {message}");
 }
 
 #[test]
@@ -214,10 +220,8 @@ at = "-d" | at = "2*d" | `contact.0.at = "2*d"` does not fit: at the defaults of
 "10*k" | "10*k*log(0)" | m.toml:23:13: `contact.0.stiffness = "10*k*log(0)"` does not fit
 "#,
     );
-    let none = FileModel::parse(&ONE_DEGREE[..ONE_DEGREE.find("[[contact]]").unwrap()], "m.toml")
-        .unwrap_err()
-        .to_string();
-    assert!(none.contains("`contact` is missing; write [[contact]]"), "{none}");
+    let (motion, _) = ONE_DEGREE.split_once("[[contact]]").unwrap();
+    check_refusal(motion, "`contact` is missing; write [[contact]]");
 }
 
 #[test]
@@ -257,25 +261,12 @@ fn a_side_may_have_several_walls() {
     assert_eq!(model.law(), Law { restitution: [0.5, 0.0], mesh_speed: [0.05, 0.0] });
     let row = ["right 2", "2*d", "elastic", "", "", "k (z - d) + c w + k (z - 2*d) + c w"];
     assert_eq!(model.contacts()[1], row);
-    let message = |text: &str| FileModel::parse(text, "m.toml").unwrap_err().to_string();
-    let error = message(&with(&[wall("d", elastic), wall("d/2", elastic), last.clone()]));
-    assert!(
-        error.contains("contact.2.at = 'd/2'")
-            && error.contains("right wall 2 = 0.125: it must be farther out"),
-        "{error}"
-    );
-    let many = vec![wall("d", elastic); 9];
-    assert!(
-        message(&with(&many)).contains("it must be 1 to 8 tables, [[contact]]"),
-        "{}",
-        message(&with(&many))
-    );
+    let inner = with(&[wall("d", elastic), wall("d/2", elastic), last]);
+    check_refusal(&inner, "contact.2.at = 'd/2'");
+    check_refusal(&inner, "right wall 2 = 0.125: it must be farther out");
+    check_refusal(&with(&vec![wall("d", elastic); 9]), "it must be 1 to 8 tables, [[contact]]");
     let five: Vec<String> = (1..6).map(|n| wall(&format!("{n}*d"), elastic)).collect();
-    assert!(
-        message(&with(&five)).contains("there are already 4 walls on this side"),
-        "{}",
-        message(&with(&five))
-    );
+    check_refusal(&with(&five), "there are already 4 walls on this side");
 }
 
 #[test]
@@ -306,26 +297,18 @@ fn a_wall_may_only_push_and_have_a_preload() {
     let right = ["right", "d", "elastic, only pushes", "", "", "max(0, k (z - d) + c w + c)"];
     let left = ["left", "-d", "elastic", "", "", "k (z + d) + c w - 0.25"];
     assert_eq!(model.contacts(), [right, left]);
-    let message = |walls: &[String]| FileModel::parse(&with(walls), "m.toml").unwrap_err().to_string();
-    let inner = message(&[wall("right", "pull = false"), wall("right", "").replace("'d'", "'2*d'")]);
-    assert!(
-        inner.contains(
-            "`contact.1.side = 'right'` does not fit: the wall before it on this side has `pull = false`"
-        ),
-        "{inner}"
+    let refused = |walls: &[String], expected: &str| check_refusal(&with(walls), expected);
+    refused(
+        &[wall("right", "pull = false"), wall("right", "").replace("'d'", "'2*d'")],
+        "`contact.1.side = 'right'` does not fit: the wall before it on this side has `pull = false`",
     );
     let hard = "[[contact]]\nside = 'right'\nat = 'd'\nlaw = 'impact'\nrestitution = 0.5\n".to_owned();
     for entry in ["pull = false", "preload = 1"] {
-        let error = message(&[format!("{hard}{entry}\n")]);
-        assert!(
-            error.contains(&format!("`contact.0.{entry}` does not fit: it needs law = \"elastic\"")),
-            "{error}"
-        );
+        let expected = format!("`contact.0.{entry}` does not fit: it needs law = \"elastic\"");
+        refused(&[format!("{hard}{entry}\n")], &expected);
     }
-    assert!(
-        message(&[wall("right", "pull = 1")])
-            .contains("`contact.0.pull = 1` has the wrong type: it must be true or false")
-    );
+    let number = "`contact.0.pull = 1` has the wrong type: it must be true or false";
+    refused(&[wall("right", "pull = 1")], number);
 }
 
 #[test]
@@ -801,9 +784,8 @@ gap = [1] | gap = [1]\nfriction = 1 | unknown field `motion.friction = 1`
 "#,
     );
     let (motion, _) = ONE_DEGREE.split_once("[[contact]]").unwrap();
-    let message = FileModel::parse(motion, "m.toml").unwrap_err().to_string();
     let end = "`contact` is missing; write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
-    assert!(message.contains(end), "{message}");
+    check_refusal(motion, end);
 }
 
 /// Three discs on a shaft, with stops between them and a mesh stiffness that changes.
@@ -974,11 +956,9 @@ fn eight_coordinates_are_read() {
         ["gap   z = x7 - x8", "rate  w = v7 - v8", "2 x1'' + 3 x1 = 0", "2 x2'' + 3 x2 = 0"]
     );
     let short = text.replace("[0, 0, 0, 0, 0, 0, 1, -1]", "[1, -1]");
-    let message = FileModel::parse(&short, "m.toml").unwrap_err().to_string();
-    assert!(message.contains("one gap row: a list of eight entries, one for each coordinate"), "{message}");
-    let message =
-        FileModel::parse(&text.replace("stiffness = [", "stiffness = [[1], "), "m.toml").unwrap_err();
-    assert!(message.to_string().contains("a matrix of eight rows with eight entries each"), "{message}");
+    check_refusal(&short, "one gap row: a list of eight entries, one for each coordinate");
+    let long = text.replace("stiffness = [", "stiffness = [[1], ");
+    check_refusal(&long, "a matrix of eight rows with eight entries each");
 }
 
 #[test]
@@ -1108,11 +1088,10 @@ frequency = 1.5 | frequency = 0 | m.toml:19:13: `motion.frequency = 0` does not 
 "#,
     );
     let (motion, _) = THREE.split_once("[[contact]]").unwrap();
-    let message = FileModel::parse(motion, "m.toml").unwrap_err().to_string();
-    assert!(message.contains("`contact` is missing; write [[contact]]"), "{message}");
+    check_refusal(motion, "`contact` is missing; write [[contact]]");
     // Each of several gaps needs a wall, with friction, too.
     let friction = format!("{motion}[[friction]]\nrow = [1, 0, 0]\nforce = 1\n");
-    assert!(FileModel::parse(&friction, "m.toml").unwrap_err().to_string().contains("`contact` is missing"));
+    check_refusal(&friction, "`contact` is missing");
 }
 
 #[test]
@@ -1130,18 +1109,11 @@ fn each_side_of_each_gap_may_have_four_walls() {
     };
     let model = read(&format!("{motion}{}", walls(4)));
     assert!(machine(&model).gaps.iter().flat_map(|gap| &gap.walls).all(|side| side.len() == 4));
-    let message = |text: String| FileModel::parse(&text, "m.toml").unwrap_err().to_string();
-    let many = message(format!("{motion}{}", walls(5)));
-    assert!(
-        many.contains("it must be 1 to 16 tables, [[contact]]: a gap has up to 4 walls on each side"),
-        "{many}"
-    );
+    let many = "it must be 1 to 16 tables, [[contact]]: a gap has up to 4 walls on each side";
+    check_refusal(&format!("{motion}{}", walls(5)), many);
     let five: String = (1..6).map(|nth| wall("left", "right", nth)).collect();
-    let five = message(format!("{motion}{five}"));
-    assert!(
-        five.contains("there are already 4 walls on this side; a gap has up to 4 on each side"),
-        "{five}"
-    );
+    let expected = "there are already 4 walls on this side; a gap has up to 4 on each side";
+    check_refusal(&format!("{motion}{five}"), expected);
 }
 
 #[test]
