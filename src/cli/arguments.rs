@@ -923,29 +923,23 @@ pub(crate) struct Completions {
     pub(crate) target: CompletionTarget,
 }
 
-/// Targets of `completions`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum CompletionTarget {
-    Bash,
-    Elvish,
-    Fish,
-    #[value(name = "powershell")]
-    PowerShell,
-    Zsh,
-    /// The man page
-    Man,
-}
+/// Target of `completions`: a shell, or none for the man page.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CompletionTarget(pub(crate) Option<Shell>);
 
-impl CompletionTarget {
-    /// The shell. None for man.
-    pub(crate) fn shell(self) -> Option<Shell> {
-        match self {
-            CompletionTarget::Bash => Some(Shell::Bash),
-            CompletionTarget::Elvish => Some(Shell::Elvish),
-            CompletionTarget::Fish => Some(Shell::Fish),
-            CompletionTarget::PowerShell => Some(Shell::PowerShell),
-            CompletionTarget::Zsh => Some(Shell::Zsh),
-            CompletionTarget::Man => None,
+impl ValueEnum for CompletionTarget {
+    fn value_variants<'a>() -> &'a [CompletionTarget] {
+        const fn of(shell: Shell) -> CompletionTarget {
+            CompletionTarget(Some(shell))
+        }
+        use Shell::{Bash, Elvish, Fish, PowerShell, Zsh};
+        const { &[of(Bash), of(Elvish), of(Fish), of(PowerShell), of(Zsh), CompletionTarget(None)] }
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self.0 {
+            Some(shell) => shell.to_possible_value(),
+            None => Some(PossibleValue::new("man").help("The man page")),
         }
     }
 }

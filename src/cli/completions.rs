@@ -15,7 +15,7 @@ use crate::model_file::BUILT_IN;
 pub(crate) fn run(arguments: &Completions) -> Result<(), Failure> {
     let mut command = Cli::command();
     let mut text = Vec::new();
-    match arguments.target.shell() {
+    match arguments.target.0 {
         Some(shell) => clap_complete::generate(shell, &mut with_values(command), "rattlemap", &mut text),
         None => {
             command.build();

@@ -27,9 +27,9 @@ pub use fake::Fake;
 pub(crate) use finish::{Completion, Ended};
 pub(crate) use flows::Flows;
 #[cfg(feature = "gpu")]
-pub(crate) use gpu::lane_settings;
-#[cfg(feature = "gpu")]
 pub use gpu::{Gpu, Prepared};
+#[cfg(feature = "gpu")]
+pub(crate) use gpu::{lane_settings, renumbered};
 #[cfg(feature = "gpu")]
 pub(crate) use requested::drop_unrequested;
 pub use requested::measured_record;

@@ -138,9 +138,7 @@ impl<'f> RunRecords<'f> {
         work: &mut Work<'_>,
     ) -> Result<RunRecords<'f>, RunRecordsError> {
         let path = folder.path().join(RECORDS);
-        let identity = Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
-            .of_coordinates(scene.coordinates())
-            .of_shard(work.shard);
+        let identity = Identity::of_run(engine, scene, work.shard);
         let (file, elapsed_before) = if resume && path.is_file() {
             let order = work.order();
             let take = |batch: &[(u32, Record)]| {

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 use super::Subject;
 use super::sample::Sample;
 use super::states::HORIZON;
-use crate::gpu::{self, Features, Gpu, GpuError, Lane, LaneSettings};
-use crate::map::engine::{Completion, Ended, lane_settings};
-use crate::map::plan::Plan;
+use crate::gpu::{self, Features, Gpu, GpuError, LaneSettings};
+use crate::map::engine::{Completion, Ended, lane_settings, renumbered};
+use crate::map::plan::{Cell, Plan};
 use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::model::State;
 use rattlemap_dynamics::orbit::{Budget, Status};
@@ -132,23 +132,9 @@ pub async fn run_lanes(
     if ids.is_empty() {
         return Ok(Vec::new());
     }
-    let cells: Vec<_> = ids.iter().map(|&id| plan.cell(id)).collect();
-    let numbered = |of: fn(&crate::map::plan::Cell) -> u32| {
-        let mut list: Vec<u32> = cells.iter().map(of).collect();
-        list.sort_unstable();
-        list.dedup();
-        list
-    };
-    let (flows, laws) = (numbered(|cell| cell.flow), numbered(|cell| cell.law));
-    let place = |list: &[u32], index: u32| list.partition_point(|&other| other < index) as u32;
-    let lanes: Vec<Lane> = cells
-        .iter()
-        .map(|cell| Lane {
-            flow: place(&flows, cell.flow),
-            law: place(&laws, cell.law),
-            start: plan.start(cell.id, records),
-        })
-        .collect();
+    let started = |&id: &u32| Cell { start: plan.start(id, records), ..plan.cell(id) };
+    let cells: Vec<_> = ids.iter().rev().map(started).collect();
+    let (flows, laws, lanes) = renumbered(&cells);
     let flows: Vec<_> = flows.iter().map(|&flow| plan.form(flow)).collect();
     let laws: Vec<_> = laws.iter().map(|&law| plan.law(law)).collect();
     let settings = &LaneSettings {

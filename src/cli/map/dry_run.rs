@@ -84,10 +84,7 @@ impl<'a> DryRun<'a> {
         let engine = &mut opened.engine;
         let records = out.join(RECORDS);
         let stored = if job.resume && records.is_file() {
-            let identity =
-                Identity::new(engine.name(), engine.precision(), &engine.device(), job.scene.identity())
-                    .of_coordinates(job.scene.coordinates())
-                    .of_shard(job.shard);
+            let identity = Identity::of_run(engine, job.scene, job.shard);
             Work::new(plan, job.shard, false).read(&records, &identity)?.count
         } else {
             0

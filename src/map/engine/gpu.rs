@@ -465,8 +465,8 @@ fn fitting(bytes: impl Iterator<Item = u64>, most: usize) -> usize {
     total.take_while(|&total| total <= gpu::MOST_BYTES).count().max(1)
 }
 
-/// Returns the flows and laws of some cells, and their lanes with indices into these lists.
-fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
+/// Returns the flows and laws of some cells, and their lanes with indices into these lists, the last lane first.
+pub(crate) fn renumbered(cells: &[Cell]) -> (Vec<u32>, Vec<u32>, Vec<Lane>) {
     let (mut flows, mut laws) = (Numbering::default(), Numbering::default());
     let lanes =
         cells.iter().rev().map(|cell| lane(cell, flows.place(cell.flow), laws.place(cell.law))).collect();

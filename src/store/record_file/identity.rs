@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::map::engine::Engine;
 use crate::map::scene::Scene;
 use crate::map::shard::Shard;
 use crate::record::RECORD_VERSION;
@@ -55,6 +56,13 @@ impl Identity {
             coordinates: two(),
             shard: None,
         }
+    }
+
+    /// Returns the identity of a run of this program that computes a scene, or a shard of it, with an engine.
+    pub fn of_run(engine: &Engine<'_>, scene: &Scene, shard: Option<Shard>) -> Identity {
+        Identity::new(engine.name(), engine.precision(), &engine.device(), scene.identity())
+            .of_coordinates(scene.coordinates())
+            .of_shard(shard)
     }
 
     /// Returns this identity for a model with this number of coordinates.
