@@ -32,7 +32,6 @@ pub(crate) fn bifurcation(
         let columns = diagram::run_until(&cells, scene.start(), &settings, &report, watch.halt())?;
         let Some(columns) = columns else { return Ok(None) };
         let arguments = DiagramArguments { sets: &sets, along: along.as_ref() };
-        let diagram = in_memory::diagram(&scene, arguments, &columns, clock.elapsed())?;
-        Ok(Some((diagram.manifest, diagram.columns, diagram.points)))
+        Ok(Some(in_memory::diagram(&scene, arguments, &columns, clock.elapsed())?))
     })
 }

@@ -53,18 +53,7 @@ pub fn map(cells: &Cells<'_>, run: &Run<'_>) -> Result<Map, OutputError> {
     })
 }
 
-/// A bifurcation diagram in memory.
-#[derive(Clone, Debug)]
-pub struct Diagram {
-    /// `manifest.json` without its list of files.
-    pub manifest: String,
-    /// `bifurcation_columns.csv`.
-    pub columns: String,
-    /// `bifurcation.csv`.
-    pub points: String,
-}
-
-/// Builds the manifest and the tables of a diagram.
+/// Returns the manifest of a diagram without its list of files, `bifurcation_columns.csv` and `bifurcation.csv`.
 ///
 /// # Errors
 /// [`OutputError`] if a result cannot be formatted.
@@ -73,16 +62,14 @@ pub fn diagram(
     arguments: DiagramArguments<'_>,
     columns: &[Column],
     elapsed: Duration,
-) -> Result<Diagram, OutputError> {
+) -> Result<(String, String, String), OutputError> {
     let (axis, names) = (&*scene.axes()[0].parameter().name, scene.base().state_names());
     let numbers = Number::of(scene.base(), &scene.outputs().quantities);
     let gaps = several_gaps(scene.base());
     let manifest = bifurcation(scene, arguments, columns, [elapsed, Duration::ZERO], &[]);
-    Ok(Diagram {
-        manifest: manifest.to_string(),
-        columns: text(|to| bifurcation_tables::write_columns(to, axis, &numbers, columns))?,
-        points: text(|to| bifurcation_tables::write_points(to, axis, &names, gaps.as_deref(), columns))?,
-    })
+    let of_columns = text(|to| bifurcation_tables::write_columns(to, axis, &numbers, columns))?;
+    let of_points = text(|to| bifurcation_tables::write_points(to, axis, &names, gaps.as_deref(), columns))?;
+    Ok((manifest.to_string(), of_columns, of_points))
 }
 
 /// Returns `trajectory.csv` of an orbit, with this number of samples per forcing period. It has no rows if the motion failed.

@@ -2,35 +2,22 @@
 
 use super::points::Point;
 
-/// The statistic of the errors of states.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Statistic {
-    /// The median over the subjects.
-    Median,
-    /// The worst subject.
-    Worst,
-}
+/// A statistic of the errors of states over the subjects.
+type Statistic = fn(&Point) -> f64;
 
-impl Statistic {
-    /// Returns the state error of a point.
-    pub fn error(self, point: &Point) -> f64 {
-        match self {
-            Statistic::Median => point.state_error_median,
-            Statistic::Worst => point.state_error_worst,
-        }
-    }
-}
+const WORST: Statistic = |point| point.state_error_worst;
+const MEDIAN: Statistic = |point| point.state_error_median;
 
 /// Returns the cost of a method with at most this error, in seconds per lane-period ([`Point::cost`]); `None` if its error is
 /// larger at every setting. Between two settings the logarithm of the cost is interpolated. The cost is never less than that
 /// of the cheapest setting.
-pub fn cost_at(points: &[&Point], statistic: Statistic, error: f64) -> Option<f64> {
+fn cost_at(points: &[&Point], statistic: Statistic, error: f64) -> Option<f64> {
     let mut sorted: Vec<&&Point> = points.iter().collect();
     sorted.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
-    let good = sorted.iter().position(|point| statistic.error(point) <= error)?;
+    let good = sorted.iter().position(|point| statistic(point) <= error)?;
     let here = sorted[good];
     let Some(before) = good.checked_sub(1).map(|i| sorted[i]) else { return Some(here.cost()) };
-    let (from, to) = (statistic.error(before), statistic.error(here));
+    let (from, to) = (statistic(before), statistic(here));
     if !from.is_finite() || to <= 0.0 {
         return Some(here.cost());
     }
@@ -39,8 +26,8 @@ pub fn cost_at(points: &[&Point], statistic: Statistic, error: f64) -> Option<f6
 }
 
 /// Returns the smallest error of a method at any setting.
-pub fn best_error(points: &[&Point], statistic: Statistic) -> f64 {
-    points.iter().map(|point| statistic.error(point)).fold(f64::INFINITY, f64::min)
+fn best_error(points: &[&Point], statistic: Statistic) -> f64 {
+    points.iter().map(|point| statistic(point)).fold(f64::INFINITY, f64::min)
 }
 
 /// The error at which methods are compared.
@@ -69,7 +56,7 @@ pub fn sentences(points: &[Point]) -> Vec<String> {
         if own.is_empty() || other.is_empty() {
             continue;
         }
-        for (statistic, of) in [(Statistic::Worst, "worst"), (Statistic::Median, "median")] {
+        for (statistic, of) in [(WORST, "worst"), (MEDIAN, "median")] {
             all.push(
                 match (cost_at(&own, statistic, EQUAL_ERROR), cost_at(&other, statistic, EQUAL_ERROR)) {
                     (Some(a), Some(b)) => format!(
@@ -92,13 +79,7 @@ pub fn sentences(points: &[Point]) -> Vec<String> {
     }
     let (lane, rk4) = (curve("lane-f64"), curve("rk4-wgsl-f64"));
     if !lane.is_empty() && !rk4.is_empty() {
-        let [a, b, c, d] = [
-            (&lane, Statistic::Worst),
-            (&rk4, Statistic::Worst),
-            (&lane, Statistic::Median),
-            (&rk4, Statistic::Median),
-        ]
-        .map(|(curve, statistic)| best_error(curve, statistic));
+        let [[a, b], [c, d]] = [WORST, MEDIAN].map(|of| [&lane, &rk4].map(|curve| best_error(curve, of)));
         all.push(format!(
             "smallest error at any setting in f64, lane against RK4 in WGSL: worst {a:.1e} against {b:.1e}, median \
              {c:.1e} against {d:.1e}"
@@ -160,20 +141,16 @@ mod tests {
     fn costs_are_interpolated_between_settings() {
         let (coarse, fine) = (point(1.0, 1e-4, Some(2)), point(2.0, 1e-6, Some(2)));
         let curve = [&fine, &coarse];
-        let cost = |error| cost_at(&curve, Statistic::Median, error);
+        let cost = |error| cost_at(&curve, MEDIAN, error);
         assert!(
             (cost(1e-5).unwrap() - 2.0 * 2f64.sqrt()).abs() < 1e-12,
             "the middle of the line, on two cores"
         );
         assert_eq!(cost(1e-3), Some(2.0), "never below the cheapest setting");
         assert_eq!(cost(1e-7), None);
-        assert_eq!(cost_at(&curve, Statistic::Worst, 1e-3), Some(2.0));
-        assert!((best_error(&curve, Statistic::Worst) - 1e-5).abs() < 1e-18);
+        assert_eq!(cost_at(&curve, WORST, 1e-3), Some(2.0));
+        assert!((best_error(&curve, WORST) - 1e-5).abs() < 1e-18);
         let lost = point(0.5, f64::INFINITY, Some(2));
-        assert_eq!(
-            cost_at(&[&lost, &coarse], Statistic::Median, 1e-3),
-            Some(2.0),
-            "no interpolation from a lost lane"
-        );
+        assert_eq!(cost_at(&[&lost, &coarse], MEDIAN, 1e-3), Some(2.0), "no interpolation from a lost lane");
     }
 }
