@@ -3,7 +3,7 @@
 use rattlemap_dynamics::model::Model;
 
 use crate::job::model_engine;
-use crate::model_file::{FileModel, Wall, letters};
+use crate::model_file::{FileModel, Wall, letters_in_words};
 use crate::show::symbols::with_unit;
 
 /// Returns the name and a summary of every built-in model.
@@ -27,8 +27,8 @@ pub fn page(model: &FileModel) -> String {
     let state: Vec<String> = state.map(|(i, name)| with_unit(name, units.component(i).as_deref())).collect();
     let frequency = definition.motion.frequency.text();
     text += &format!("    state {}; forcing period 2 pi over {frequency}\n", state.join(", "));
-    if let Some(letters) = letters(model) {
-        text += &format!("    letters of the gaps in words: {letters}\n");
+    if let Some(letters) = letters_in_words(model) {
+        text += &format!("    {letters}\n");
     }
     if let Ok(oscillator) = model.oscillator() {
         text += &format!("    Engine: {}.\n", model_engine::described(&oscillator));

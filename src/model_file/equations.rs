@@ -2,19 +2,22 @@
 
 use rattlemap_dynamics::model::{Contact, Side};
 
-use super::contact::{Wall, WallLaw};
+use super::contact::WallLaw;
 use super::definition::Definition;
-use super::entry::Entry;
+use super::entry::{Entry, Staged};
 use super::friction::DryFriction;
 use super::motion::MotionTable;
 use super::signal::Signal;
 use crate::text::expression::Expression;
 
-/// Returns the equations as lines: gaps, stages, friction, and one equation per coordinate with a contact force for each gap that has
-/// walls. `names` are those of each gap and its velocity.
+/// Returns the equations as lines: the equation of all coordinates, gaps, stages, friction, and one equation per coordinate with a
+/// contact force for each gap that has walls. `names` are those of each gap and its velocity.
 pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<String> {
     let motion = &definition.motion;
-    let mut lines = Vec::new();
+    let has_walls = |index: usize| definition.walls[index].iter().any(|walls| !walls.is_empty());
+    let suffixes = names.iter().map(|[z, _]| if names.len() == 1 { String::new() } else { format!("_{z}") });
+    let suffixes: Vec<_> = suffixes.enumerate().map(|(i, suffix)| has_walls(i).then_some(suffix)).collect();
+    let mut lines = matrices(definition, &suffixes);
     for (gap, [z, w]) in motion.gaps.iter().zip(names) {
         lines.push(format!("gap   {}", row(&gap.row, &motion.coordinates, z)));
         lines.push(format!("rate  {}", row(&gap.row, &motion.velocities, w)));
@@ -25,13 +28,49 @@ pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<Strin
         format!("friction  sticks at {rate} = 0 while |friction force| <= {}", text(&friction.force))
     }));
     lines.extend(definition.signals.iter().map(|signal| signal_line(signal, motion)));
-    let force = |(gap, [z, _]): (&[Vec<Wall>; 2], &[String; 2])| {
-        let has_walls = gap.iter().any(|walls| !walls.is_empty());
-        has_walls.then(|| if names.len() == 1 { "N".to_owned() } else { format!("N_{z}") })
-    };
-    let forces: Vec<_> = definition.walls.iter().zip(names).map(force).collect();
+    let forces: Vec<_> = suffixes.iter().map(|suffix| Some(format!("N{}", suffix.as_ref()?))).collect();
     lines.extend(equations(definition, &forces));
     lines
+}
+
+/// Returns the equation of all coordinates with its matrices, and what their vector is. Terms that are 0 are left out, and `(t)` marks
+/// those that change from stage to stage. `suffixes` are those of the gaps that have walls.
+fn matrices(definition: &Definition, suffixes: &[Option<String>]) -> Vec<String> {
+    let motion = &definition.motion;
+    let term = |name: &str, rows: &[Vec<Staged>], factor: &str| {
+        let mut entries = rows.iter().flatten();
+        let time = if entries.clone().any(|entry| same(entry).is_none()) { "(t)" } else { "" };
+        entries.any(|entry| constant(entry).is_some()).then(|| format!("{name}{time}{factor}"))
+    };
+    let friction = acting(definition).next().map(|_| "friction".to_owned());
+    let contact = suffixes.iter().map(|suffix| suffix.as_ref().map(|gap| format!("g{gap} N{gap}")));
+    let left = [
+        Some("M x''".to_owned()),
+        term("C", &motion.damping, " x'"),
+        term("K", &motion.stiffness, " x"),
+        friction,
+    ];
+    let further = motion.harmonics.iter().flat_map(|harmonic| [&harmonic.cos, &harmonic.sin]);
+    let is_forced =
+        further.chain([&motion.force, &motion.force_sin]).flatten().any(|entry| constant(entry).is_some());
+    let force = is_forced.then(|| "F(t)".to_owned());
+    let count = motion.degrees();
+    let mut names = format!(
+        "x = ({}), {count} coordinate{}",
+        motion.coordinates.join(", "),
+        if count == 1 { "" } else { "s" }
+    );
+    if motion.bodies != motion.coordinates {
+        names += &format!(": {}", motion.bodies.join(", "));
+    }
+    let with = match suffixes.iter().flatten().count() {
+        0 => "",
+        1 => ", with the contact force N along the row g of the gap",
+        _ => ", with the contact force N along the row g of each gap",
+    };
+    let right = sum([force, term("load", std::slice::from_ref(&motion.load), "")]);
+    let equation = format!("{} = {right}{with}", sum(left.into_iter().chain(contact)));
+    vec![equation, names]
 }
 
 /// Returns a row for each wall: its name, position and law, restitution, the largest rate at which contact is sustained, and the

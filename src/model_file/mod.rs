@@ -128,6 +128,12 @@ pub fn gap_columns(model: &dyn Model) -> Vec<[String; 2]> {
     names.iter().map(|name| [name.clone(), rate(name)]).collect()
 }
 
+/// Explains the letters in words, if the model has several gaps.
+pub fn letters_in_words(model: &dyn Model) -> Option<String> {
+    letters(model)
+        .map(|letters| format!("in words, the letter before a symbol is that of its gap: {letters}"))
+}
+
 /// Returns the letter that each gap has in words, and its name, if the model has several gaps.
 pub fn letters(model: &dyn Model) -> Option<String> {
     let names = several_gaps(model)?;

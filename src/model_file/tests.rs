@@ -230,7 +230,7 @@ fn common_names_are_free_and_the_gap_gets_another_name() {
         ONE_DEGREE.replace("\"x\"", "\"z\"").replace("F = 1.5", "w = 1.5\nn = 2").replace("F*", "w*n*");
     let model = read(&renamed);
     assert_eq!((model.state_names(), gap_names(&model)), (vec!["z", "v"], ["gap", "gap_rate"]));
-    assert_eq!(model.equations()[..2], ["gap   gap = z", "rate  gap_rate = v"]);
+    assert_eq!(model.equations()[2..4], ["gap   gap = z", "rate  gap_rate = v"]);
     assert_eq!(gap_names(&read(ONE_DEGREE)), ["z", "w"]);
 }
 
@@ -350,6 +350,8 @@ fn equations_are_written_in_usual_notation() {
     assert_eq!(
         FileModel::built_in("gear-pair").unwrap().equations(),
         [
+            "M x'' + C x' + K x + g N = F(t), with the contact force N along the row g of the gap",
+            "x = (x1, x2), 2 coordinates: gear 1, gear 2",
             "gap   z = x1 - x2",
             "rate  w = v1 - v2",
             "m1 x1'' + r1 x1' + k1 x1 + N = F cos(omega t)",
@@ -357,13 +359,22 @@ fn equations_are_written_in_usual_notation() {
         ]
     );
     assert_eq!(
-        read(ONE_DEGREE).equations(),
-        ["gap   z = x", "rate  w = v", "x'' + 2*zeta x' + x + N = F*omega^2 cos(omega t) - 0.5",]
+        read(ONE_DEGREE).equations()[1..],
+        [
+            "x = (x), 1 coordinate",
+            "gap   z = x",
+            "rate  w = v",
+            "x'' + 2*zeta x' + x + N = F*omega^2 cos(omega t) - 0.5",
+        ]
     );
+    let unforced = FileModel::built_in("meissner").unwrap().equations();
+    assert!(unforced[0].starts_with("M x'' + C x' + K(t) x + g N = 0, with"), "{unforced:?}");
+    let friction = FileModel::built_in("friction-oscillator").unwrap().equations();
+    assert_eq!(friction[..2], ["M x'' + C x' + K x + friction = F(t)", "x = (x), 1 coordinate"]);
     assert_eq!(read(ONE_DEGREE).contacts()[0][5], "keeps z = s while pressed");
     assert_eq!(read(TWO_DEGREES).contacts()[0][5], "100 (z - d)");
     assert_eq!(
-        read(TWO_DEGREES).equations()[2..],
+        read(TWO_DEGREES).equations()[4..],
         [
             "m a'' + 0.5 b'' + c a' - c b' + k a - k b + N = 0",
             "0.5 a'' + b'' - c a' + (c + d) b' - k a + (k+1) b - 2 N = 0",
@@ -377,7 +388,7 @@ fn a_force_has_a_cosine_and_a_sine() {
     let mut model = read(&ONE_DEGREE.replace(force, &format!("{force}\nforce_sin = [\"-2*F\"]")));
     let at_zero = pair(&model);
     assert_eq!((at_zero.force, at_zero.force_sin), ([6.0, 0.0], [-3.0, 0.0]));
-    let [_, _, free] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
+    let [.., free] = &model.equations()[..] else { panic!("{:?}", model.equations()) };
     assert!(free.ends_with("= F*omega^2 cos(omega t) - 2*F sin(omega t) - 0.5"), "{free}");
     assert!(model.parameters()[model.index("F").unwrap()].shapes.oscillator());
     // A quarter turn later the cosine has become the negative sine.
@@ -413,7 +424,7 @@ fn harmonics_are_read_in_the_order_of_their_frequencies() {
     assert_eq!(*second, Harmonic { order: 2, cos: [0.0; 2], sin: [-3.0, 0.0] });
     assert_eq!(*fourth, Harmonic { order: 4, cos: [7.5, 0.0], sin: [-1.0, 0.0] });
     let line = "x'' + 2*zeta x' + x + N = F*omega^2 cos(omega t) - 2*F sin(2 omega t) + F/s cos(4 omega t) - sin(4 omega t) - 0.5";
-    assert_eq!(model.equations()[2], line);
+    assert_eq!(model.equations()[4], line);
     // Half a turn later odd harmonics have the other sign.
     assert!(model.set_start_phase(std::f64::consts::PI));
     let later = pair(&model);
@@ -427,7 +438,7 @@ fn harmonics_are_read_in_the_order_of_their_frequencies() {
 fn frequencies_of_harmonics_are_written_in_usual_notation() {
     let at = |frequency: &str| {
         let text = ONE_DEGREE.replace("\"omega\"\ngap", &format!("\"{frequency}\"\ngap")) + HARMONICS;
-        let line = read(&text).equations()[2].clone();
+        let line = read(&text).equations()[4].clone();
         line.split_once("2*F sin(").unwrap().1.split_once(')').unwrap().0.to_owned()
     };
     assert_eq!(
@@ -531,7 +542,7 @@ fn stages_have_their_own_domains() {
         [(0.0625, 0), (0.125, 1), (0.3125, 0), (0.375, 1), (0.5625, 0), (0.625, 1), (0.8125, 0), (0.875, 1)];
     assert_eq!(repeated.oscillator().unwrap().schedule, phases);
     assert_eq!(
-        model.equations()[2..],
+        model.equations()[4..],
         [
             "stages  1 from phase 0, 2 from phase eps - 1 of each forcing period",
             "        [stage 1 | stage 2] lists the values of an entry that changes",
@@ -540,7 +551,7 @@ fn stages_have_their_own_domains() {
         ]
     );
     assert_eq!(model.contacts()[0][5], "[10*k1 | 10*k2] (z - 0.5) + [1 | c] w");
-    let line = &repeated.equations()[2];
+    let line = &repeated.equations()[4];
     assert_eq!(line, "stages  1 from phase 0.25, 2 from phase eps - 1 of each 1/4 of the forcing period");
 }
 
@@ -560,7 +571,7 @@ fn equal_stages_have_the_domains_of_a_model_without_stages() {
     assert!(lists.contains(r#"["k1", "k1"]"#) && a.stages.is_empty() && a.schedule.is_empty());
     assert_eq!(format!("{a:?}"), format!("{:?}", b.in_stage(0)), "to the bit");
     assert_eq!(format!("{a:?}"), format!("{:?}", b.in_stage(1)));
-    assert_eq!(without.equations()[2..], with.equations()[4..]);
+    assert_eq!(without.equations()[4..], with.equations()[6..]);
 }
 
 #[test]
@@ -717,7 +728,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
     };
     assert_eq!(model.oscillator().unwrap(), by_hand);
     assert_eq!(
-        model.equations(),
+        model.equations()[2..],
         [
             "gap   z = x",
             "rate  w = v",
@@ -730,7 +741,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
 #[test]
 fn friction_is_written_in_usual_notation() {
     assert_eq!(
-        read(&with_friction()).equations()[2..],
+        read(&with_friction()).equations()[4..],
         [
             "friction  sticks at c/d a' - b' - u = 0 while |friction force| <= mu*k",
             "friction  sticks at a' = 0 while |friction force| <= 0.5",
@@ -740,7 +751,7 @@ fn friction_is_written_in_usual_notation() {
     );
     let written = |row: &str, force: &str, speed: &str| {
         let table = format!("[[friction]]\nrow = [{row}, 0]\nforce = {force}\nspeed = {speed}\n");
-        let line = read(&format!("{TWO_DEGREES}{table}")).equations()[3].clone();
+        let line = read(&format!("{TWO_DEGREES}{table}")).equations()[5].clone();
         line.split_once("- k b ").map_or(line.clone(), |(_, rest)| rest.to_owned())
     };
     assert_eq!(written("1", "\"k + c\"", "1.5"), "+ (k + c) sgn(a' - 1.5) + N = 0");
@@ -952,7 +963,7 @@ fn eight_coordinates_are_read() {
     assert!(found.drives.is_empty() && found.schedule.is_empty());
     assert_eq!(model.state_names()[14..], ["x8", "v8"]);
     assert_eq!(
-        model.equations()[..4],
+        model.equations()[2..6],
         ["gap   z = x7 - x8", "rate  w = v7 - v8", "2 x1'' + 3 x1 = 0", "2 x2'' + 3 x2 = 0"]
     );
     let short = text.replace("[0, 0, 0, 0, 0, 0, 1, -1]", "[1, -1]");
@@ -1121,6 +1132,9 @@ fn equations_of_several_gaps_have_one_contact_force_for_each() {
     assert_eq!(
         read(THREE).equations(),
         [
+            "M x'' + C(t) x' + K(t) x + friction + g_left N_left + g_right N_right = F(t) + load(t), with the contact force N \
+             along the row g of each gap",
+            "x = (x, y, q), 3 coordinates",
             "gap   left = x - y",
             "rate  left' = v1 - v2",
             "gap   right = y - c q",

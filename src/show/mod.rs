@@ -24,6 +24,7 @@ pub mod provenance;
 pub mod refinement;
 pub mod replay;
 pub mod report;
+mod sketch;
 pub mod symbols;
 pub mod table;
 pub mod validation;

@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
 use crate::map::schedule::{Audit, Refined};
-use crate::model_file::FileModel;
+use crate::model_file::{FileModel, letters_in_words};
 use crate::record::Record;
 use crate::show::cells::{Cells, Finished, Row, Source};
 use crate::show::color::{Color, hex};
@@ -31,7 +31,7 @@ use crate::show::provenance::Provenance;
 use crate::show::symbols::{axis_label, symbol};
 use crate::show::table::attractors_csv::attractor_name;
 use crate::show::words::{MapWords, WordIndex};
-use crate::show::{caption, drawing, figure, refinement, replay};
+use crate::show::{caption, drawing, figure, refinement, replay, sketch};
 use rattlemap_dynamics::model::Parameter;
 use rattlemap_dynamics::orbit::{Class, Status};
 
@@ -91,6 +91,8 @@ pub fn data(
         "model": scene.base().title(),
         "source": scene.base().source(),
         "equations": scene.base().downcast_ref::<FileModel>().map(FileModel::equations),
+        "sketch": scene.base().downcast_ref::<FileModel>().map(|model| drawing::svg(&sketch::draw(model))),
+        "letters": letters_in_words(scene.base()),
         // The scene without its axes, to which the page adds those of the view, and the command that computes it.
         "scene": scene.settings(),
         "compute": compute(made),
@@ -134,7 +136,8 @@ pub fn data(
 pub fn write(mut page: impl Write, data: &Value) -> Result<(), WriteError> {
     // The script contains that of the worker, so that the policy's hash covers both.
     let worker = packed("u8", WORKER.as_bytes());
-    let [style, script] = [STYLE, &format!("{SCRIPT}const WORKER = {worker};\n")].map(inline);
+    let script = format!("{}const WORKER = {worker};\n", without_comments(SCRIPT));
+    let [style, script] = [STYLE, &script].map(inline);
     let engine = STANDARD.encode(ENGINE);
     let policy = policy(&style, &script);
     let title = data["title"].as_str().unwrap_or_default().replace('&', "&amp;").replace('<', "&lt;");
@@ -177,6 +180,12 @@ impl<W: Write> Write for InScript<W> {
     fn flush(&mut self) -> io::Result<()> {
         self.0.flush()
     }
+}
+
+/// Removes the lines that are comments. They are a fifth of the scripts.
+fn without_comments(script: &str) -> String {
+    let is_comment = |line: &str| line.starts_with("//") || (line.starts_with("/**") && line.ends_with("*/"));
+    script.lines().filter(|line| !is_comment(line.trim_start())).flat_map(|line| [line, "\n"]).collect()
 }
 
 /// Returns the content of a script or style element. Browsers compute its hash after converting line ends to line feeds.

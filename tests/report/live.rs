@@ -193,16 +193,6 @@ async function tools() {
 tools().catch((error) => { said.error = String(error.stack); finish(); });
 "##;
 
-/// Collects whether the page is wider than a phone, and which parts are visible.
-const PHONE: &str = r##"
-until(() => !document.getElementById("wait")).then(() => {
-  said.overflow = document.scrollingElement.scrollWidth - innerWidth;
-  said.width = innerWidth;
-  said.order = ["stage", "legend-box", "readout", "parameters"].map((id) => document.getElementById(id).getBoundingClientRect().top);
-  finish();
-});
-"##;
-
 /// Waits for the shaders, and computes a part of the map with lanes.
 const LANES: &str = r##"
 async function computeOnLanes() {
@@ -285,7 +275,7 @@ fn rattlemap(folder: &TempDir) -> Command {
 }
 
 /// Writes the page of a scene of this repository. The arguments are the scene's name and options.
-fn explored(folder: &TempDir, arguments: &[&str]) -> PathBuf {
+pub(crate) fn explored(folder: &TempDir, arguments: &[&str]) -> PathBuf {
     rattlemap(folder)
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes"))
         .args(["explore", "--no-open", "--quiet", "--out"])
@@ -402,17 +392,6 @@ fn the_page_compares_goes_back_plays_and_saves() {
     assert_eq!(said["layer"], serde_json::json!([1, "exponent"]));
     let white = serde_json::json!([true, 255, 255, 255, 255]);
     assert_eq!(said["files"], serde_json::json!(["map.png", white, white]));
-    let phone = visited(browser, &page, PHONE, "", &["--disable-gpu", "--window-size=500,800"]);
-    assert!(phone["overflow"].as_i64().unwrap() <= 0, "{phone}");
-    let tops: Vec<f64> = serde_json::from_value(phone["order"].clone()).unwrap();
-    assert!(tops.is_sorted(), "{phone}");
-    let paper = folder.path().join("page.pdf");
-    let status = std::process::Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=3000"])
-        .args([format!("--print-to-pdf={}", paper.display()), format!("file://{}", page.display())])
-        .stderr(std::process::Stdio::null())
-        .status();
-    assert!(status.unwrap().success() && fs::metadata(paper).unwrap().len() > 20_000);
 }
 
 /// The browser's own software device computes the page's shaders.

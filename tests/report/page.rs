@@ -14,6 +14,8 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
+use crate::report::devtools::Browser;
+
 const COLUMNS: usize = 24;
 const ROWS: usize = 19;
 
@@ -363,6 +365,9 @@ fn the_report_is_one_page_with_all_cells() {
     let page = report.page();
     assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("src="));
     assert_eq!(page.matches("</script>").count(), 3, "the title ended a script");
+    let script = between(&page, "<script>", "const WORKER");
+    let comments = script.lines().filter(|line| line.trim_start().starts_with("//") || line.ends_with("*/"));
+    assert_eq!((comments.count(), script.contains("\nlet view = {")), (0, true));
     let (data, table) = (report.data(), report.table());
     assert_eq!(data["title"], "Evil </script><b>title</b> & more");
     assert_eq!((table.len(), &data["validation"]), (COLUMNS * ROWS, &Value::Null));
@@ -508,12 +513,16 @@ fn impacts_alone() -> Report {
 #[test]
 fn the_page_lists_what_was_computed_and_how() {
     let read = "said.names = [...document.querySelectorAll(\"#readout th\")].map((head) => head.textContent); \
-                said.fixed = text(\"fixed\"); said.made = text(\"made\");";
+                said.fixed = text(\"fixed\"); said.made = text(\"made\"); said.equations = text(\"equations\"); \
+                said.sketch = document.getElementById(\"sketch\").naturalWidth > 400;";
     let Some(said) = impacts_alone().visited(read) else { return };
     let expected = ["e", "\u{3c9}", "class", "impacts", "status", "periods run", "cell"];
     assert_eq!(said["names"], json!(expected));
     let fixed = said["fixed"].as_str().unwrap();
     assert!(fixed.contains("Model: Gear pair. Source: Study on the Nonlinear"), "{fixed}");
+    let equations = said["equations"].as_str().unwrap();
+    assert!(equations.starts_with("M x'' + C x' + K x + g N = F(t), "), "{equations}");
+    assert_eq!(said["sketch"], true);
     let made = said["made"].as_str().unwrap();
     let version = env!("CARGO_PKG_VERSION");
     let start = format!("Computed by rattlemap {version} (commit ");
@@ -521,6 +530,19 @@ fn the_page_lists_what_was_computed_and_how() {
         made.starts_with(&start) && made.contains("with the engine cpu in f64: event-driven reference."),
         "{made}"
     );
+}
+
+#[test]
+fn the_page_explains_the_letters_of_gaps() {
+    let report = Report::of(
+        "model = \"two-loose-gears\"\n[[axis]]\nparameter = \"omega\"\nmin = 150\nmax = 230\ncount = 3\n[[axis]]\nparameter = \"e\"\n\
+         min = 0.3\nmax = 0.7\ncount = 2\n[outputs]\nquantities = [\"class\", \"word\"]\nfiles = [\"html\"]\n",
+    );
+    let letters = "in words, the letter before a symbol is that of its gap: a = a, b = b";
+    assert_eq!(report.data()["letters"], letters);
+    let Some(mut page) = Browser::open(&report.file("report.html")) else { return };
+    let shown = page.value("showLayer(1); [document.getElementById('letters'), document.querySelector('#legend .beyond')].map((note) => note.textContent)");
+    assert_eq!(shown, json!([letters, letters]));
 }
 
 /// Presses keys without a pointer, then follows the link to the page.

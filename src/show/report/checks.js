@@ -1,10 +1,14 @@
 // Tables below and beside the map: the audit of filled cells, and the validation.
 
+/** @type {(n: number, one: string, many?: string) => string} */
 const count = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
+/** @type {(value: any) => string} */
 const short = (value) => (typeof value === "number" ? Number(value.toPrecision(4)).toString() : String(value ?? "\u2013"));
+/** @type {(name: string) => string} */
 const spaced = (name) => name.replaceAll("_", " ");
 
 // Shows what an adaptive map reports, and how each audit of the filled cells ended.
+/** @type {(refinement: Refinement) => void} */
 function showRefinement({ lines: [first, ...errors], audits }) {
   byId("refined").hidden = false;
   byId("audit").textContent = first;
@@ -19,7 +23,9 @@ function showRefinement({ lines: [first, ...errors], audits }) {
 }
 
 // Returns a table with a caption. `numbers` are the indices of columns of numbers.
+/** @type {(caption: string, heads: string[], lines: Row[], numbers?: number[]) => any} */
 function table(caption, heads, lines, numbers = []) {
+  /** @type {(tag: string, cells: any[], bad?: boolean) => any} */
   const row = (tag, cells, bad) => {
     const node = element("tr", undefined, bad ? "bad" : undefined);
     node.append(...cells.map((text, k) => element(tag, text, numbers.includes(k) ? "number" : undefined)));
@@ -33,8 +39,10 @@ function table(caption, heads, lines, numbers = []) {
 }
 
 // Fields whose names need an explanation.
+/** @type {Record<string, string>} */
 const FIELDS = { word: "word, up to mirror image", pattern: "pattern, up to mirror image", attractor: "attractor of the start",
   finite: "numbers are finite", again: "record computed again" };
+/** @type {(name: string) => string} */
 const fieldName = (name) => FIELDS[name] ?? spaced(name);
 
 // Returns the first columns of a cell: a button that shows it on the map, and the values of its parameters.
@@ -52,7 +60,9 @@ function place({ i, j, values }) {
 }
 
 // Returns the table of the chaotic cells whose chaos ends.
+/** @type {(found: ChaosEnds) => any} */
 function ended({ cells, further_periods: periods, followed, ended: { count: ends, text } }) {
+  /** @type {(cell: any) => Row} */
   const line = ({ class: name, period, periods_run: after, replay, ...cell }) =>
     ({ cells: [...place(cell), period ? `period ${period}` : name, after, element("code", replay)] });
   return table(`Chaos that ends within ${periods} further periods: ${ends} of ${followed} cells (${text})`,
@@ -60,16 +70,19 @@ function ended({ cells, further_periods: periods, followed, ended: { count: ends
 }
 
 // Returns the table of the cells that differ, grouped by kind. Cells without an explanation come first.
+/** @type {(found: Validation) => any} */
 function differing({ kinds, mismatches }) {
+  /** @type {(difference: { field: string, map: any, judge: any }) => string} */
   const difference = ({ field, map, judge }) => `${fieldName(field)}: ${short(map)}, judge ${short(judge)}`;
   const parameters = map.axes.map((axis) => axis.parameter);
+  /** @type {(cell: any) => Row} */
   const line = ({ differences, kind, replay, ...cell }) => ({ bad: kind === "unexplained",
     cells: [...place(cell), differences.map(difference).join("; "), element("code", replay)] });
   const order = Object.keys(kinds).sort((a, b) => Number(b === "unexplained") - Number(a === "unexplained"));
-  const groups = order.map((kind) => [kind, mismatches.filter((mismatch) => mismatch.kind === kind)]);
+  const groups = order.map((kind) => ({ kind, list: mismatches.filter((mismatch) => mismatch.kind === kind) }));
   const box = element("div");
   box.append(element("h3", "Cells that differ, by kind"));
-  for (const [kind, list] of groups.filter(([, list]) => list.length)) {
+  for (const { kind, list } of groups.filter(({ list }) => list.length)) {
     const group = table(`${spaced(kind)}: ${count(list.length, "cell")}`, ["cell", ...parameters, "what differs", "replay"], list.map(line));
     group.firstChild.after(element("p", kinds[kind], "note"));
     box.append(group);
@@ -78,6 +91,7 @@ function differing({ kinds, mismatches }) {
 }
 
 // Shows a validation. One that an earlier program stored may lack texts.
+/** @type {(found: Validation) => void} */
 function showValidation(found) {
   const section = byId("validation");
   section.hidden = byId("validated").hidden = false;

@@ -6,6 +6,7 @@
 const HIDDEN = "b8b8b8";
 
 // Returns the palette of a layer. If an entry is isolated, all other colours are replaced.
+/** @type {(layer: Layer) => string[]} */
 function isolatedPalette({ palette, entries, entry_of: of }) {
   const entry = entries.findIndex(({ text }) => text === isolated);
   return entry < 0 ? palette : palette.map((color, index) => (of[index] === entry ? color : HIDDEN));
@@ -19,6 +20,7 @@ const BEYOND = 0.005;
 const INSPECTED = 200000;
 
 // Returns the ends of the numbers in the visible cells; those of the whole map if all cells are visible or none has a number.
+/** @type {(sheet: Sheet, layer: Layer) => number[]} */
 function visibleRange({ place, columns: across, rows: up }, { bar: { low, high, anchors, is_fixed: isFixed }, values: numbers }) {
   if (spansMap || isFixed || showsAll()) return [low, high];
   const [width, height] = [place.width / across, place.height / up];
@@ -42,8 +44,9 @@ function visibleRange({ place, columns: across, rows: up }, { bar: { low, high, 
 
 // Returns a function from a number to the index of its colour, which is linear between the anchors. The ends of the range
 // replace the outer anchors. The last index is for cells without a number.
+/** @type {(layer: any) => (number: number) => number} */
 function levels({ bar: { anchors }, range: [from, to], palette }) {
-  const numbers = [from, ...anchors.slice(1, -1).map(([number]) => number), to];
+  const numbers = [from, ...anchors.slice(1, -1).map((/** @type {[number, number]} */ [number]) => number), to];
   return (number) => {
     if (Number.isNaN(number)) return palette.length - 1;
     const k = numbers.length > 2 && number > numbers[1] ? 1 : 0;
@@ -68,6 +71,7 @@ function fitColors() {
 // Colours, ticks and heading of the bar that is shown; none if the layer has no bar.
 /** @type {any} */ let shownBar = null;
 
+/** @type {(layer: Layer) => void} */
 function showBar(current) {
   shownBar = null;
   byId("bar").replaceChildren();
@@ -78,11 +82,11 @@ function showBar(current) {
   const level = current.values && levels({ ...current, range: [low, high] });
   const colors = level ? Array.from({ length: 44 }, (_, k) => current.palette[level(low + ((high - low) * k) / 43)]) : all;
   const ramp = element("div", undefined, "ramp");
-  ramp.style.background = `linear-gradient(to right, ${colors.map((c) => `#${c}`).join(",")})`;
+  ramp.style.background = `linear-gradient(to right, ${colors.map((/** @type {string} */ c) => `#${c}`).join(",")})`;
   const scale = element("div", undefined, "ticks");
   const { marks, factor } = barTicks(current.bar, low, high);
-  const places = marks.map(([value, text]) => [(value - low) / (high - low), text]);
-  for (const [share, text] of places) {
+  const places = marks.map(([value, text]) => ({ share: (value - low) / (high - low), text }));
+  for (const { share, text } of places) {
     const tick = element("span", text);
     tick.style.left = `${100 * share}%`;
     // Labels are centred; near the ends of the bar they stay inside it.
@@ -98,6 +102,7 @@ function showBar(current) {
     ...remarks.map((text) => element("div", text, "beyond")));
 }
 
+/** @type {(index: number) => void} */
 function showLayer(index) {
   if (layer !== index) isolated = null;
   layer = index;
@@ -105,12 +110,16 @@ function showLayer(index) {
     button.setAttribute("aria-checked", k === layer);
     button.tabIndex = k === layer ? 0 : -1;
   });
+  const list = byId("layers");
+  const { offsetTop: top, offsetHeight: height } = list.children[layer];
+  list.scrollTop = within(list.scrollTop, top + height - list.offsetTop - list.clientHeight, top - list.offsetTop);
   fitColors();
   updateLink();
   share();
 }
 
 // Lists the named colours with their shares of the cells. An entry of a layer without numbers can be shown alone.
+/** @type {(layer: Layer) => void} */
 function showLegend(current) {
   byId("legend-title").textContent = current.title;
   byId("legend").replaceChildren(...current.entries.map(({ color, text, share }) => {
@@ -136,9 +145,10 @@ function showLegend(current) {
     item.append(button);
     return item;
   }));
+  if (["word", "pattern"].includes(current.name) && map.letters) byId("legend").append(element("li", map.letters, "beyond"));
 }
 
-byId("whole").addEventListener("change", (event) => {
+byId("whole").addEventListener("change", (/** @type {any} */ event) => {
   spansMap = event.target.checked;
   fitColors();
   updateLink();

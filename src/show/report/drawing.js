@@ -10,12 +10,14 @@ const plotArea = () => {
 };
 
 // Returns the position of a pixel, in cells of the program's map.
+/** @type {(x: number, y: number) => [number, number]} */
 function position(x, y) {
   const p = plotArea();
   return [view.left + ((x - p.x) / p.width) * view.width, view.bottom + ((p.y + p.height - y) / p.height) * view.height];
 }
 
 // Returns the uppermost cell at a pixel, or null.
+/** @type {(x: number, y: number) => Cell | null} */
 function cellAt(x, y) {
   const p = plotArea();
   if (x < p.x || x > p.x + p.width || y < p.y || y > p.y + p.height) return null;
@@ -24,6 +26,7 @@ function cellAt(x, y) {
 }
 
 // Returns the pixel of a position in cells. Cell i spans i to i + 1.
+/** @type {(i: number, j: number) => [number, number]} */
 function pixel(i, j) {
   const p = plotArea();
   return [p.x + ((i - view.left) / view.width) * p.width,
@@ -31,6 +34,7 @@ function pixel(i, j) {
 }
 
 // Returns the position of a value of an axis, in cells.
+/** @type {(axis: Axis, value: number) => number} */
 function placeOf({ min, max, count, scale, values }, value) {
   if (scale === "values") return values.indexOf(value) + 0.5;
   const share = scale === "log" ? Math.log(value / min) / Math.log(max / min) : (value - min) / (max - min);
@@ -41,6 +45,7 @@ function placeOf({ min, max, count, scale, values }, value) {
 const PALE = 0.4;
 
 // Draws a sheet into an image with one pixel per cell. Numbers get the colours of the layer `scale`.
+/** @type {(sheet: Sheet, own: Layer, scale: any) => any} */
 function paint(sheet, own, scale) {
   const { columns: across, rows: up } = sheet;
   const picture = document.createElement("canvas");
@@ -53,6 +58,7 @@ function paint(sheet, own, scale) {
     return (0xff000000 | (blue << 16) | (green << 8) | red) >>> 0;
   }));
   const level = own.values && levels(scale);
+  /** @type {(id: number) => number} */
   const index = own.values ? (id) => level(own.values[id]) : (id) => own.indices[id];
   for (let j = 0; j < up; j++) {
     const [from, to] = [j * across, (up - 1 - j) * across];
@@ -104,6 +110,7 @@ function draw() {
 }
 
 // Calls a function with the pixels of a rectangle: x, y, width, height.
+/** @type {(place: Place, use: (x: number, y: number, width: number, height: number) => void) => void} */
 function box({ left, bottom, width, height }, use) {
   const [x, y] = pixel(left, bottom + height);
   const [right, below] = pixel(left + width, bottom);
@@ -111,6 +118,7 @@ function box({ left, bottom, width, height }, use) {
 }
 
 // Draws a frame around a rectangle, at least as wide as `least` pixels.
+/** @type {(around: Place, color: string, least: number) => void} */
 function frame(around, color, least) {
   box(around, (x, y, width, height) => {
     const grow = Math.max(0, (least - width) / 2);
@@ -125,6 +133,7 @@ function frame(around, color, least) {
 }
 
 // Draws a circle at a position, for a strobe state of an attractor.
+/** @type {(u: number, v: number) => void} */
 function mark(u, v) {
   const [x, y] = pixel(u, v);
   for (const [width, color] of [[4, "#fff"], [1.8, "#262626"]]) {
@@ -136,6 +145,7 @@ function mark(u, v) {
   }
 }
 
+/** @type {(area: { x: number, y: number, width: number, height: number }) => void} */
 function drawAxes(p) {
   pen.strokeStyle = pen.fillStyle = getComputedStyle(canvas).color;
   pen.lineWidth = 1;

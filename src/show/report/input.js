@@ -1,8 +1,10 @@
 // Zooming, panning, choosing a cell with pointer or keys, and the link to what is shown.
 
 // Smallest width or height of a view, in cells: four if the page cannot compute finer cells, else almost zero.
+/** @type {(axis: Axis) => number} */
 const leastExtent = (axis) => (map.live && axis.scale !== "values" ? 1e-9 * axis.count : Math.min(4, axis.count));
 
+/** @type {(factor: number, x: number, y: number) => void} */
 function zoom(factor, x, y) {
   const p = plotArea();
   const [u, v] = [(x - p.x) / p.width, (p.y + p.height - y) / p.height];
@@ -38,21 +40,22 @@ let moved = 0;
 /** @type {any} */ let drawnRectangle = null;
 /** @type {any} */ let corner = null;
 // The pixel under the pointer; none outside the canvas.
-/** @type {any} */ let hovered = null;
+/** @type {[number, number] | null} */ let hovered = null;
 
-canvas.addEventListener("wheel", (event) => {
+canvas.addEventListener("wheel", (/** @type {WheelEvent} */ event) => {
   event.preventDefault();
   zoom(Math.exp(0.0015 * event.deltaY), event.offsetX, event.offsetY);
 }, { passive: false });
 
-canvas.addEventListener("pointerdown", (event) => {
+canvas.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
   canvas.setPointerCapture(event.pointerId);
   pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
   moved = 0;
   corner = event.shiftKey || isPressed("draw-rectangle") ? position(event.offsetX, event.offsetY) : null;
 });
 
-canvas.addEventListener("pointermove", (event) => {
+canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+  /** @type {[number, number]} */
   const here = [event.offsetX, event.offsetY];
   const before = pointers.get(event.pointerId);
   if (!before) {
@@ -74,6 +77,7 @@ canvas.addEventListener("pointermove", (event) => {
   canvas.classList.add("dragging");
   const p = plotArea();
   if (others.length === 1) {
+    /** @type {(at: number[]) => number} */
     const apart = (at) => Math.max(Math.hypot(at[0] - others[0][0], at[1] - others[0][1]), 1);
     zoom(apart(before) / apart(here), (here[0] + others[0][0]) / 2, (here[1] + others[0][1]) / 2);
   } else {
@@ -83,7 +87,7 @@ canvas.addEventListener("pointermove", (event) => {
   }
 });
 
-canvas.addEventListener("pointerup", (event) => {
+canvas.addEventListener("pointerup", (/** @type {PointerEvent} */ event) => {
   pointers.delete(event.pointerId);
   canvas.classList.remove("dragging");
   if (drawnRectangle) {
@@ -95,7 +99,7 @@ canvas.addEventListener("pointerup", (event) => {
   const cell = cellAt(event.offsetX, event.offsetY);
   if (moved < 4 && cell) choose(cell);
 });
-canvas.addEventListener("pointercancel", (event) => pointers.delete(event.pointerId));
+canvas.addEventListener("pointercancel", (/** @type {PointerEvent} */ event) => pointers.delete(event.pointerId));
 canvas.addEventListener("pointerleave", () => hover(null));
 
 // Finds the cell under the pointer again after the pointer, the view or the sheets have changed.
@@ -107,6 +111,7 @@ function hover(at = hovered) {
 }
 
 // Shows a rectangle, in cells. One that is too small or outside the map is enlarged or moved.
+/** @type {(place: Place) => void} */
 function showView({ left, bottom, width, height }) {
   view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
   keepInside();
@@ -116,7 +121,9 @@ canvas.addEventListener("dblclick", () => showAll());
 byId("home").addEventListener("click", () => showAll());
 byId("back").addEventListener("click", () => history.back());
 
+/** @type {(id: string) => boolean} */
 const isPressed = (id) => byId(id).getAttribute("aria-pressed") === "true";
+/** @type {(id: string, isOn: boolean) => void} */
 const press = (id, isOn) => byId(id).setAttribute("aria-pressed", isOn);
 byId("draw-rectangle").addEventListener("click", () => press("draw-rectangle", !isPressed("draw-rectangle")));
 
@@ -124,6 +131,7 @@ document.addEventListener("keydown", (event) => {
   // Keys typed into a field do not control the map.
   if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLInputElement) return;
   const p = plotArea();
+  /** @type {Record<string, number[]>} */
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const number = Number(event.key);
   if (event.key === "+" || event.key === "=") zoom(0.7, p.x + p.width / 2, p.y + p.height / 2);
@@ -150,6 +158,7 @@ document.addEventListener("keydown", (event) => {
 });
 
 // Moves the view so that it contains a cell.
+/** @type {(cell: any) => void} */
 function follow(cell) {
   const { left: i, bottom: j, width, height } = rectangle({ sheet: base, ...cell });
   const [left, bottom] = [within(view.left, i + width - view.width, i), within(view.bottom, j + height - view.height, j)];
@@ -168,7 +177,7 @@ function updateLink() {
   for (const [name, value] of Object.entries(changes)) parts.push(`set=${encodeURIComponent(name)}:${value}`);
   // The link stores the centre minus 0.5: the index of a cell of the program's map.
   const centre = awaited ?? (selectedCell && centreOf(selectedCell));
-  if (centre) parts.push(`cell=${centre.map((x) => Number((x - 0.5).toPrecision(12))).join(",")}`);
+  if (centre) parts.push(`cell=${centre.map((/** @type {number} */ x) => Number((x - 0.5).toPrecision(12))).join(",")}`);
   if (!showsAll()) parts.push(`view=${[view.left, view.bottom, view.width, view.height].join(",")}`);
   if (spansMap) parts.push("colors=map");
   link = parts.join("&");
@@ -189,11 +198,13 @@ function updateLink() {
 }
 
 // Position of a cell that the link names and that has yet to be computed.
-/** @type {any} */ let awaited = null;
+/** @type {[number, number] | null} */ let awaited = null;
 
 // Shows what a link names; it may name nothing.
+/** @type {(text: string) => void} */
 function readLink(text) {
   const named = new URLSearchParams(text);
+  /** @type {(name: string) => number[]} */
   const numbers = (name) => (named.get(name) ?? "").split(",").map((text) => (text === "" ? NaN : Number(text)));
   spansMap = byId("whole").checked = named.get("colors") === "map";
   const sets = named.getAll("set").map((text) => text.split(":")).map(([name, value]) => [name, Number(value)]);
@@ -207,13 +218,15 @@ function readLink(text) {
     view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
   }
   const [i, j] = numbers("cell");
+  /** @type {(index: number, count: number) => boolean} */
   const exists = (index, count) => index > -0.5 && index < count - 0.5;
   const isNamed = exists(i, columns) && exists(j, rows);
   const isOwn = isNamed && !isChanged() && Number.isInteger(i) && Number.isInteger(j);
   showLayer(Math.max(map.layers.findIndex(({ name }) => name === named.get("layer")), 0));
   choose(isOwn ? { i, j } : null);
   awaited = isNamed && !isOwn ? [i + 0.5, j + 0.5] : null;
-  if (named.get("beside") !== null) openSecond(named.get("beside"));
+  const beside = named.get("beside");
+  if (beside !== null) openSecond(beside);
   else if (second) closeSecond();
   keepInside();
   updateLink();

@@ -14,6 +14,7 @@ let triedLanes = false;
 const software = new URLSearchParams(location.search).get("lanes") === "software";
 
 // Opens the device, once.
+/** @type {(module: WebAssembly.Module) => void} */
 function openLanes(module) {
   if (triedLanes || !navigator.gpu) return;
   triedLanes = true;

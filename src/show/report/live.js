@@ -9,14 +9,17 @@ const MOST_BYTES = 128e6;
 const SPELL = 40;
 const REDRAW = 1000;
 
-// The part of the map that workers compute now, with its view, scene and progress; null if the program's map is fine enough.
-/** @type {any} */ let job = null;
+// The part of the map that workers compute now, with its view, scene and progress; null if the program's
+// map is fine enough. Most functions run only while there is a job, so the type does not say null.
+/** @type {any} */ const NO_JOB = null;
+/** @type {Job} */ let job = NO_JOB;
 // Workers, each with the job and the runs of its request.
 /** @type {any[]} */ let pool = [];
 // Whether the reader has stopped the job.
 let isPaused = false;
 
 // Returns the values that a window needs along an axis, and the part of the axis that they cover, in cells.
+/** @type {(axis: Axis, from: number, extent: number) => Along} */
 function windowAlong(axis, from, extent) {
   if (axis.scale === "values") {
     const [first, last] = visible(axis.count, from, extent);
@@ -24,6 +27,7 @@ function windowAlong(axis, from, extent) {
     return { values, cover: () => [first, values.length] };
   }
   const [first, last] = [Math.max(0, from - 0.5), Math.min(axis.count - 1, from + extent - 0.5)];
+  /** @type {(count: number) => [number, number]} */
   const cover = (count) => {
     const cell = (last - first) / (count - 1);
     return [first + 0.5 - cell / 2, count * cell];
@@ -51,13 +55,14 @@ function wish() {
     return;
   }
   isPaused = false;
-  job = { key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, by_lanes: 0, drawn: false, next: false };
+  job = /** @type {Job} */ ({ key, along, view: { ...view }, begun: performance.now(), changes: { ...changes }, level: firstLevel() - 1, by_lanes: 0, drawn: false, next: false });
   // A figure, which the user asked for, is waited for.
   pool.filter(({ request }) => request && request.task !== "figure" && performance.now() - request.begun > PATIENCE).forEach(stop);
   nextLevel();
 }
 
 // Number of cells along an axis at a level.
+/** @type {(level: number) => number} */
 const countAt = (level) => (COARSEST - 1) * 2 ** level + 1;
 
 // Returns the first level that is not coarser than what the program's map shows.
@@ -70,7 +75,7 @@ function firstLevel() {
 }
 
 function stopJob() {
-  job = null;
+  job = NO_JOB;
   isPaused = false;
   showWork();
   byId("live").textContent = "";
@@ -157,7 +162,8 @@ async function employ() {
   if (!job) return;
   const most = within(navigator.hardwareConcurrency || 2, 1, 16);
   while (pool.length < most) {
-    const member = { request: null, per_ms: 0.2 };
+    /** @type {Member} */
+    const member = { worker: null, request: null, per_ms: 0.2 };
     member.worker = newWorker(module, (answer) => receive(member, answer), failJob);
     pool.push(member);
   }
@@ -194,6 +200,7 @@ byId("stop").addEventListener("click", () => {
 // A hidden page gives its workers nothing to do.
 document.addEventListener("visibilitychange", () => employ().catch(failJob));
 
+/** @type {(member: Member) => void} */
 function assign(member) {
   if (!job || isPaused || document.hidden) return;
   const isLanes = member === lanes;
@@ -204,10 +211,12 @@ function assign(member) {
     return;
   }
   const common = { key: job.id, ...windowOf(job) };
+  /** @type {(task: string, own: any) => void} */
   const send = (task, own) => {
     member.request = { job, id: job.id, task, begun: performance.now(), ...own };
     member.worker.postMessage({ task, ...common, ...own });
   };
+  /** @type {(task: string, count: number) => void} */
   const compute = (task, count) => {
     const runs = job.todo.slice(job.next_run, job.next_run + count);
     job.next_run += runs.length;
@@ -237,9 +246,11 @@ function assign(member) {
 }
 
 // What a worker needs to know to compute the cells of a job.
+/** @type {(part: { scene: string, changes: Record<string, number> }) => any} */
 const windowOf = ({ scene, changes: changed }) => ({ scene, model: map.model_file,
   sets: Object.entries(changed).map(([name, value]) => `parameters.${name}=${value}`).join("\n") });
 
+/** @type {(member: Member, answer: any) => void} */
 function receive(member, { records, data, figure, labels, opened, prepared, error, broken }) {
   const { request } = member;
   const isLanes = member === lanes;
@@ -267,7 +278,7 @@ function receive(member, { records, data, figure, labels, opened, prepared, erro
     member.per_ms = request.runs.length / Math.max(performance.now() - request.begun, 1);
     if (isLanes && request.runs.length >= FEWEST_LANES) dropSlowLanes();
     if (job && request.job === job && request.id === job.id) {
-      request.runs.forEach((run, k) => {
+      request.runs.forEach((/** @type {number} */ run, /** @type {number} */ k) => {
         job.records.set(records.subarray(k * size, (k + 1) * size), run * size);
         job.pending[run] = 0;
       });
@@ -291,17 +302,20 @@ function receive(member, { records, data, figure, labels, opened, prepared, erro
 // Number of cells in a sample.
 const SAMPLED = 64;
 // Samples that workers have yet to compute in f64.
+/** @type {any[]} */
 const samples = [];
 let checkedProgram = false;
 
 // Draws some of a sheet's cells, and has a worker compute their class and period again. Calls `tell` with the number of cells
 // and of those that have the same class and period.
+/** @type {(sheet: Sheet, candidates: number[] | null, window: any, tell: (all: number, same: number) => void) => void} */
 function drawSample({ values: { class: classes, period: periods, source } }, candidates, window, tell) {
   if (!classes) return;
   const integrated = (candidates ?? Array.from(classes, (_, id) => id)).filter((id) => id < classes.length && (!source || source[id] === 0));
   const cells = Array.from({ length: Math.min(SAMPLED, integrated.length) }, () => integrated[Math.floor(Math.random() * integrated.length)]);
+  /** @type {(labels: Uint8Array) => (id: number, k: number) => boolean} */
   const isSame = (labels) => (id, k) => labels[2 * k] === classes[id] && labels[2 * k + 1] === periods[id];
-  samples.push({ cells, window, tell: (labels) => tell(cells.length, cells.filter(isSame(labels)).length) });
+  samples.push({ cells, window, tell: (/** @type {Uint8Array} */ labels) => tell(cells.length, cells.filter(isSame(labels)).length) });
   employ().catch(failJob);
 }
 
@@ -326,8 +340,9 @@ function checkLanes() {
 }
 
 // Shows the cells of a job, and begins its next level if all of them are there.
+/** @type {(data: MapData, request: any) => Promise<void>} */
 async function showWindow(data, { job: of, id, whole: isWhole, pending }) {
-  const [[left, width], [bottom, height]] = of.along.map(({ cover }, k) => cover(data.axes[k].count));
+  const [[left, width], [bottom, height]] = /** @type {Along[]} */ (of.along).map(({ cover }, k) => cover(data.axes[k].count));
   const sheet = await fill(sheetOf(data, { left, bottom, width, height }));
   if (of !== job || id !== job.id) return;
   Object.assign(sheet, { job: of, made: of.view, ranges: of.ranges, isWhole, pending });
@@ -348,6 +363,7 @@ async function showWindow(data, { job: of, id, whole: isWhole, pending }) {
 
 // Selects the cell that the link names. After a change of parameters, selects the cell at the same place again. Each finer
 // picture selects the cell that contains this place.
+/** @type {(sheet: Sheet) => void} */
 function chooseIn(sheet) {
   if (!awaited && selectedCell && selectedCell.sheet.data.fixed !== sheet.data.fixed) awaited = centreOf(selectedCell);
   const place = awaited;
@@ -359,23 +375,26 @@ function chooseIn(sheet) {
 }
 
 // Gives a selected cell that this page computed the records of a newer picture, if that has a cell with the same values.
+/** @type {(sheet: Sheet) => void} */
 function renewSelection(sheet) {
   if (!selectedCell || selectedCell.sheet === base || selectedCell.sheet.data.fixed !== sheet.data.fixed) return;
   const cell = cellOf(sheet, ...centreOf(selectedCell));
   if (cell && String(valuesAt(cell)) === String(valuesAt(selectedCell))) selectedCell = cell;
 }
 
+/** @type {(member: Member) => void} */
 function stop(member) {
   member.worker.terminate();
   if (member.request?.sample) samples.push(member.request.sample);
   pool = pool.filter((other) => other !== member);
 }
 
+/** @type {(error: any) => void} */
 function failJob(error) {
   byId("live").textContent = `not computed: ${error.message ?? error}`;
   byId("save-svg").hidden = true;
   const isOutdated = job?.next;
-  job = null;
+  job = NO_JOB;
   showWork();
   if (isOutdated) wish();
 }
@@ -391,12 +410,13 @@ const BEAT = 250;
 /** @type {any} */ let played = null;
 
 // Calls `step` again and again, each time after the picture of the previous step; not if its button is pressed already.
+/** @type {(button: any, step?: () => void) => void} */
 function play(button, step) {
   const isSame = played?.button === button;
   if (played) clearInterval(played.timer);
   played?.button.setAttribute("aria-pressed", "false");
   played = null;
-  if (!button || isSame) return;
+  if (!step || isSame) return;
   button.setAttribute("aria-pressed", "true");
   played = { button, timer: setInterval(() => document.hidden || isPaused || (job && !job.drawn) || step(), BEAT) };
 }
@@ -415,6 +435,7 @@ function showParameters() {
     [slider.value, field.value] = [now, now];
     slider.setAttribute("aria-label", label);
     field.setAttribute("aria-label", label);
+    /** @type {(text: string) => void} */
     const change = (text) => {
       const number = Number(text);
       if (text === "" || !Number.isFinite(number)) return;
@@ -454,14 +475,18 @@ byId("restore").addEventListener("click", () => {
 });
 
 // Offers a file for download.
+/** @type {(blob: Blob | null, name: string) => void} */
 function save(blob, name) {
+  if (!blob) return;
   const link = Object.assign(element("a"), { href: URL.createObjectURL(blob), download: name });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
+/** @type {(ending: string) => string} */
 const fileName = (ending) => `${map.layers[layer].name}.${ending}`;
 
 // Saves a drawing, twice as large, on a white ground.
+/** @type {(drawn: Blob) => Promise<void>} */
 async function saveAsPicture(drawn) {
   const image = Object.assign(new Image(), { src: URL.createObjectURL(drawn) });
   await image.decode();
@@ -471,10 +496,11 @@ async function saveAsPicture(drawn) {
   brush.fillRect(0, 0, picture.width, picture.height);
   brush.drawImage(image, 0, 0, picture.width, picture.height);
   URL.revokeObjectURL(image.src);
-  picture.toBlob((blob) => save(blob, fileName("png")));
+  picture.toBlob((/** @type {Blob | null} */ blob) => save(blob, fileName("png")));
 }
 
 // Draws the map in black ink, for paper.
+/** @type {(color: string) => void} */
 function ink(color) {
   canvas.style.color = color;
   draw();
@@ -493,6 +519,7 @@ function titledPicture() {
   [picture.width, picture.height] = [canvas.width, ratio * (top + height + bar + 22 * Math.ceil(entries.length / across) + 12)];
   const brush = picture.getContext("2d");
   brush.scale(ratio, ratio);
+  /** @type {(text: string, x: number, y: number, font?: string) => void} */
   const write = (text, x, y, font = "13px system-ui, sans-serif") => {
     brush.fillStyle = "#000";
     brush.font = font;
@@ -509,13 +536,13 @@ function titledPicture() {
   if (shownBar) {
     const { colors, places, heading } = shownBar;
     const ramp = brush.createLinearGradient(14, 0, 414, 0);
-    colors.forEach((color, k) => ramp.addColorStop(k / (colors.length - 1), `#${color}`));
+    colors.forEach((/** @type {string} */ color, /** @type {number} */ k) => ramp.addColorStop(k / (colors.length - 1), `#${color}`));
     write(heading, 14, below);
     brush.fillStyle = ramp;
     brush.fillRect(14, below + 6, 400, 14);
-    for (const [share, text] of places) write(text, 10 + 400 * share, below + 34);
+    for (const { share, text } of places) write(text, 10 + 400 * share, below + 34);
   }
-  entries.forEach(({ color, text, share }, k) => {
+  /** @type {Entry[]} */ (entries).forEach(({ color, text, share }, k) => {
     const [x, y] = [14 + 260 * (k % across), below + bar + 22 * Math.floor(k / across)];
     brush.fillStyle = `#${color}`;
     brush.fillRect(x, y - 11, 24, 13);
@@ -526,14 +553,15 @@ function titledPicture() {
 }
 
 // Has a worker draw the figure of a computed view.
+/** @type {(ending: string) => void} */
 function wantFigure(ending) {
   job.wants_figure = { layer: map.layers[layer].name, ending };
   employ().catch(failJob);
 }
 byId("save-png").addEventListener("click", () => {
   if (job && !byId("save-svg").hidden) wantFigure("png");
-  else titledPicture().toBlob((blob) => save(blob, fileName("png")));
+  else titledPicture().toBlob((/** @type {Blob | null} */ blob) => save(blob, fileName("png")));
 });
 byId("save-model").hidden = !map.model_file;
-byId("save-model").addEventListener("click", () => save(new Blob([map.model_file]), "model.toml"));
+byId("save-model").addEventListener("click", () => save(new Blob([map.model_file ?? ""]), "model.toml"));
 byId("save-svg").addEventListener("click", () => job && wantFigure("svg"));

@@ -26,10 +26,11 @@ function compiled() {
 }
 
 // Shows the motion of a cell; none hides it.
+/** @type {(cell: Cell | null) => void} */
 function showOrbit(cell) {
   wanted = cell;
   byId("motion").hidden = byId("orbit").hidden = !cell || map.model_file === null;
-  if (byId("motion").hidden) return;
+  if (!cell || byId("motion").hidden) return;
   byId("which-motion").textContent = byId("which-orbit").textContent = `Motion at ${nameOf(cell)}`;
   // Tells a notebook that shows this page in a frame.
   if (parent !== window && !isSecond) parent.postMessage({ kind: "rattlemap", command: byId("command").textContent }, "*");
@@ -41,6 +42,7 @@ function showOrbit(cell) {
 }
 
 // Names a cell by the values of its axes.
+/** @type {(cell: Cell) => string} */
 const nameOf = (cell) => valuesAt(cell).map((value, k) => `${map.axes[k].symbol} = ${Number(value.toPrecision(8))}`).join(", ");
 
 // Says what the map and the motion of the selected cell are if they differ, and which of them the program gives.
@@ -72,6 +74,7 @@ async function compute() {
 }
 
 // Starts a worker with the engine. Calls `answer` with each message, and `failed` with a text if the worker cannot run.
+/** @type {(module: WebAssembly.Module, answer: (data: any) => void, failed: (error: any) => void) => Worker} */
 function newWorker(module, answer, failed) {
   const script = URL.createObjectURL(new Blob([workerScript], { type: "text/javascript" }));
   const started = new Worker(script);
@@ -84,6 +87,7 @@ function newWorker(module, answer, failed) {
   return started;
 }
 
+/** @type {(module: WebAssembly.Module) => void} */
 function startWorker(module) {
   worker = newWorker(module, ({ command, result, broken }) => {
     const took = performance.now() - request.begun;
@@ -108,6 +112,7 @@ function stopWorker() {
 }
 
 // Reports a failure. The next selection tries again.
+/** @type {(error: any) => void} */
 function fail(error) {
   stopWorker();
   engine = null;

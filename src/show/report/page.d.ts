@@ -11,10 +11,223 @@ interface Place {
   height: number;
 }
 
+// The object of src/show/report.rs, after `fill` has unpacked its arrays.
+interface MapData {
+  title: string;
+  subtitle: string;
+  fixed: string;
+  parameters: Parameter[];
+  made: { engine: string, precision: string, device: string, version: string, commit: string };
+  model: string;
+  source: string | null;
+  equations: string[] | null;
+  // SVG.
+  sketch: string | null;
+  letters: string | null;
+  scene: string;
+  compute: string;
+  axes: Axis[];
+  derived: Derived[];
+  replay: string;
+  model_file: string | null;
+  components: number;
+  // Runs per cell, bytes of a record, and whether the page computes before the first zoom; null if it cannot compute.
+  live: any;
+  start: number[] | null;
+  starts?: Packed;
+  layers: Layer[];
+  values: Record<string, Packed>;
+  classes: string[];
+  statuses: string[];
+  sources: string[];
+  finishers: string[];
+  words: string[];
+  patterns: string[];
+  attractors: string[];
+  marks: [number, number][];
+  refinement: Refinement | null;
+  validation: Validation | null;
+}
+
+interface Packed {
+  type: string;
+  data: string;
+}
+
+interface Parameter {
+  name: string;
+  symbol: string;
+  label: string;
+  value: number;
+  min: number | null;
+  max: number | null;
+}
+
+// Positions on a scale with their labels, and the common factor of these. `asked` is the request that they answer.
+interface Ticks {
+  marks: [number, string][];
+  factor: string;
+}
+
+interface Axis {
+  parameter: string;
+  symbol: string;
+  label: string;
+  min: number;
+  max: number;
+  count: number;
+  scale: string;
+  start?: number;
+  // Absent on linear axes.
+  values?: any;
+  ticks: Ticks;
+  asked?: string;
+}
+
+// The values of an axis of a view: its ends and their number, or a list.
+interface Span {
+  min?: any;
+  max?: any;
+  count?: number;
+  values?: number[];
+}
+
+interface Derived extends Packed {
+  parameter: string;
+  along: boolean[];
+  values?: any;
+}
+
+interface Entry {
+  color: string;
+  text: string;
+  share: string;
+}
+
+interface Bar {
+  label: string;
+  colors: string[];
+  low: number;
+  high: number;
+  left_out: string[];
+  // Numbers with the indices of their colours.
+  anchors: [number, number][];
+  is_fixed: boolean;
+  ticks: Ticks;
+  asked?: string;
+}
+
+interface Layer {
+  name: string;
+  short: string;
+  title: string;
+  palette: string[];
+  entries: Entry[];
+  entry_of: (number | null)[];
+  bar: any;
+  // Numbers of the cells, or indices of their colours.
+  values?: any;
+  indices?: any;
+  ready?: boolean;
+  range?: number[];
+  // The drawn layer, and what it was drawn for.
+  picture?: any;
+  key?: string;
+}
+
+interface Refinement {
+  lines: string[];
+  audits: { sampled: number, wrong: number }[];
+}
+
+// The object of src/show/validation.rs.
+interface Validation {
+  verdict: string;
+  kinds: Record<string, string>;
+  strata: { name: string, text?: string, sampled: number, runs: number, differing: Share, kinds: Record<string, Share> }[];
+  agreement: Record<string, { compared: number, agreeing: number }>;
+  chaos: { name: string, cells: number, distance: number, bar: number | null, fails: boolean }[];
+  chaos_ends?: ChaosEnds;
+  counted: string;
+  faults: string[];
+  samples: number;
+  integrated: number;
+  seed: number;
+  remarks?: string[];
+  mismatches: (JudgedCell & { kind: string, differences: { field: string, map: any, judge: any }[] })[];
+}
+
+interface Share {
+  count: number;
+  text: string;
+}
+
+interface JudgedCell {
+  i: number;
+  j: number;
+  values: Record<string, number>;
+  replay: string;
+}
+
+interface ChaosEnds {
+  cells: (JudgedCell & { class: string, period: number | null, periods_run: number })[];
+  further_periods: number;
+  followed: number;
+  ended: Share;
+}
+
+// A row of a table, marked if it is bad.
+interface Row {
+  cells: any[];
+  bad?: boolean;
+}
+
+// The values that a window needs along an axis, and the part of the axis that a number of cells covers.
+interface Along extends Span {
+  cover: (count: number) => [number, number];
+}
+
+// The part of the map that workers compute.
+interface Job {
+  key: string;
+  id: string;
+  along: Along[];
+  view: Place;
+  begun: number;
+  changes: Record<string, number>;
+  level: number;
+  by_lanes: number;
+  drawn: boolean;
+  next: boolean;
+  onLanes: boolean;
+  isDone: boolean;
+  scene: string;
+  counts: number[];
+  ranges: Span[];
+  // The bytes of all records, the runs to compute, and a 1 for each run whose record is missing or a copy.
+  records: Uint8Array;
+  todo: number[];
+  pending: Uint8Array;
+  next_run: number;
+  ended: number;
+  total: number;
+  redrawn: number;
+  wants_data: boolean;
+  awaits_data: boolean;
+  wants_figure: { layer: string, ending: string } | null;
+}
+
+// A worker, and its request, the number of cells that it computes per ms, and whether its shaders are compiled.
+interface Member {
+  worker: any;
+  request: any;
+  per_ms: number;
+  isReady?: boolean;
+}
+
 // A map to draw.
 interface Sheet {
-  // The object of src/show/report/data.rs.
-  data: any;
+  data: MapData;
   place: Place;
   // Arrays by name.
   values: any;
@@ -23,7 +236,7 @@ interface Sheet {
   rows: number;
   // The view and the axes for which the page computed the sheet, and whether all of its cells are computed.
   made?: Place;
-  ranges?: any[];
+  ranges?: Span[];
   isWhole?: boolean;
   // The part of the map to which the sheet belongs, and a 1 for each cell whose record is a copy.
   job?: any;

@@ -7,6 +7,7 @@ const isSecond = document.documentElement.classList.contains("panel");
 let shared = "";
 
 // Opens the second panel with what a link names.
+/** @type {(text: string) => void} */
 function openSecond(text) {
   if (second) {
     second.link = text;

@@ -1,5 +1,6 @@
 // Fills the page and shows what the link names.
 
+/** @type {(data: MapData) => void} */
 function showFixed({ fixed, model, source }) {
   byId("fixed").textContent = (fixed ? `Other parameters: ${fixed}. ` : "") + `Model: ${model}.` + (source ? ` Source: ${source}.` : "");
 }
@@ -13,6 +14,9 @@ async function start() {
   byId("compute").textContent = map.compute;
   byId("equations").hidden = !map.equations?.length;
   byId("equations").textContent = (map.equations ?? []).join("\n");
+  byId("sketch").hidden = !map.sketch;
+  if (map.sketch) byId("sketch").src = URL.createObjectURL(new Blob([map.sketch], { type: "image/svg+xml" }));
+  if (map.values.word || map.values.pattern) byId("letters").textContent = map.letters ?? "";
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
     button.type = "button";
@@ -20,8 +24,10 @@ async function start() {
     button.addEventListener("click", () => showLayer(k));
     return button;
   }));
-  byId("layers").addEventListener("keydown", ({ key }) => {
-    const step = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[key];
+  byId("layers").addEventListener("keydown", (/** @type {KeyboardEvent} */ { key }) => {
+    /** @type {Record<string, number>} */
+    const steps = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 };
+    const step = steps[key];
     if (!step) return;
     showLayer((layer + step + map.layers.length) % map.layers.length);
     byId("layers").children[layer].focus();

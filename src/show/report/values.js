@@ -1,19 +1,25 @@
-// The panel beside the map: values of a cell, and the commands that compute a cell or the view again.
+// Beside the map: values of a cell, and the commands that compute a cell or the view again.
 
 // Returns names and values of what was computed for a cell.
+/** @type {(cell: Cell) => any[][]} */
 function facts(cell) {
   const { sheet: { data, values, columns: across }, i, j } = cell;
   const id = j * across + i;
+  /** @type {(name: string) => any} */
   const at = (name) => values[name]?.[id];
+  /** @type {(value: number) => string | undefined} */
   const round = (value) => (Number.isNaN(value) ? undefined : Number(value.toPrecision(5)).toString());
   const source = data.sources[at("source")];
   // The values of filled cells are not measured.
+  /** @type {(text?: string) => string | undefined} */
   const between = (text) => (text !== undefined && source === "filled" ? `${text}, interpolated` : text);
   const measured = data.layers.filter((of) => of.values).map(({ name, short, title, values: numbers }) => {
     const [number, error] = [round(numbers[id]), round(at(`${name}_error`) ?? NaN)];
     return [short, between(number && error ? `${number} \u00b1 ${error}` : number), title];
   });
+  /** @type {(array: string, name: string, text: (index: number) => any) => any[][]} */
   const computed = (array, name, text) => (values[array] ? [[name, text(at(array))]] : []);
+  /** @type {(list: string[]) => (index: number) => string} */
   const spelled = (list) => (index) => (list[index] === "" ? "no events" : list[index]);
   const found = [
     ...computed("class", "class", (index) => (data.classes[index] === "periodic" ? period(cell.sheet, id) : data.classes[index])),
@@ -35,6 +41,7 @@ function facts(cell) {
 }
 
 // Returns the period of a cell; a legend can say more about it, as in "period 1, no contact".
+/** @type {(sheet: Sheet, id: number) => string} */
 function period({ data, values }, id) {
   const text = `period ${values.period[id]}`;
   const entries = data.layers.filter((of) => of.indices).map(({ entries, palette, indices }) =>
@@ -57,6 +64,7 @@ function updateReadout() {
 }
 
 // Selects a cell of a sheet, by default of the program's map, and shows the command that replays it.
+/** @type {(cell: { sheet?: Sheet, i: number, j: number } | null) => void} */
 function choose(cell) {
   selectedCell = cell && { sheet: base, ...cell };
   awaited = null;
@@ -82,7 +90,9 @@ function choose(cell) {
 }
 
 // Returns a scene over two axes, each with the least and greatest value and the number of cells, or with its values.
+/** @type {(settings: string, ranges: Span[]) => string} */
 function sceneOver(settings, ranges) {
+  /** @type {(axis: Axis, span: Span) => string} */
   const lines = ({ parameter, start, scale }, { min, max, count, values }) => {
     const head = `[[axis]]\n${start === undefined ? "parameter" : "start"} = ${JSON.stringify(parameter)}\n`;
     if (values) return `${head}values = [${values.join(", ")}]\n`;
@@ -93,17 +103,19 @@ function sceneOver(settings, ranges) {
 
 // Shows the scene of the visible cells, with the resolution of the whole map, and the command that computes it.
 function showScene() {
+  /** @type {(axis: Axis, from: number, extent: number) => Span} */
   const range = (axis, from, extent) => {
     const [first, last] = visible(axis.count, from, extent);
     if (axis.scale === "values") return { values: axis.values.slice(first, last + 1) };
     return { min: axisValue(axis, first), max: axisValue(axis, last), count: axis.count };
   };
   const [a, b] = map.axes;
-  byId("scene").textContent = uppermost() === live ? sceneOver(live.data.scene, live.ranges)
+  byId("scene").textContent = uppermost() === live ? sceneOver(live.data.scene, live.ranges ?? [])
     : sceneOver(map.scene, [range(a, view.left, view.width), range(b, view.bottom, view.height)]);
 }
 
 // Copies the text of an element when its button is pressed.
+/** @type {(button: HTMLElement, text: HTMLElement) => void} */
 function copies(button, text) {
   const label = button.textContent;
   button.addEventListener("click", async () => {
