@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds the website from the repository's pages with mdBook: target/site/index.html. Installs mdBook with cargo if it is missing.
 # Every file that a page links to, pictures included, is copied. Fails if a page of the website links to a missing file.
+# With --live, the program is built, and the gallery's pages that compute are added.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -14,6 +15,7 @@ book=target/site-source
 rm -rf "$book" target/site
 mkdir -p "$book/src"
 cp site/book.toml site/wide.css "$book/"
+[[ "${1:-}" != --live ]] || scripts/pages.sh "$book/src/live"
 python3 - "$book/src" <<'PYTHON'
 """Copies the pages of the summary and the files that they link to, and makes a page of the notebook."""
 import base64, json, re, shutil, sys
@@ -57,10 +59,20 @@ for page in filter(Path.exists, developers):
     summary += f"{'  ' if page.parent.name and page.name != 'README.md' else ''}- [{heading}]({page.as_posix()})\n"
 pages = [Path(target) for target, _ in LINK.findall(summary)]
 (book / "docs").mkdir()
+# The list of pages that compute: those of scripts/pages.sh, and the reports of maps in results.
+live = [(page, page.relative_to(book)) for page in sorted(book.glob("live/*.html")) if page.name != "index.html"]
+reports = [(page, page) for page in sorted(Path("results").glob("**/report.html"))]
+for page, _ in reports:
+    copy(page)
+lines = ["# Maps that compute", "", "Open a map, zoom in, move a slider, click a cell. Everything is computed in your browser.", ""]
+for page, link in reports + live:
+    title = re.search("<title>([^<]*)", page.read_text(encoding="utf-8"))
+    lines.append(f"- [{title[1] if title else link.stem}]({link.as_posix()})")
+(book / "live.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 # A notebook becomes a page of its own.
 (book / "docs/python.md").write_text(notebook(Path("docs/python.ipynb")), encoding="utf-8")
 for page in pages:
-    text = (book / page if page == Path("docs/python.md") else page).read_text(encoding="utf-8")
+    text = (book / page if (book / page).exists() else page).read_text(encoding="utf-8")
     # mdBook renames README.md to index.md, but not in links.
     text = text.replace("python.ipynb", "python.md").replace("README.md)", "index.md)").replace("README.md#", "index.md#")
     for target, _ in LINK.findall(text):
@@ -80,7 +92,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 site, missing = Path(sys.argv[1]), []
-pages = [page for page in site.rglob("*.html") if page.name not in ("404.html", "toc.html", "report.html")]
+pages = [page for page in site.rglob("*.html") if page.name not in ("404.html", "toc.html", "report.html") and page.parent.name != "live"]
 ids = {page.resolve(): set(re.findall(r'id="([^"]+)"', page.read_text(encoding="utf-8"))) for page in pages}
 for page in pages:
     for target in re.findall(r'(?:href|src)="([^"]+)', page.read_text(encoding="utf-8")):

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: Names of cells without a cycle, in the order of legends.
 _WITHOUT_CYCLE = ("chaotic", "quasi-periodic", "undecided", "failed")
 
+#: Name of cells without a value if their class is not known: chaotic, quasi-periodic, undecided or failed.
+_NO_VALUE = "not periodic or undecided"
+
 #: Units of a width, in inches; smallest and largest width; type size of figures with a width, in points.
 _UNITS = {"mm": 1 / 25.4, "cm": 1 / 2.54, "in": 1.0, "pt": 1 / 72}
 _WIDTHS = (60 / 25.4 - 1e-9, 300 / 25.4 + 1e-9)
@@ -46,12 +49,14 @@ def plot(
     data
         A map of :func:`rattlemap.map`, :func:`rattlemap.basins` or :func:`rattlemap.open`: draws its attractors if it has any,
         else periods and classes. Or one of its variables: ``ds["class"]``, ``ds["pattern"]``, ``ds["word"]``, ``ds["status"]``,
-        ``ds["period"]``, ``ds["attractor"]``; two dimensions. Or a diagram of :func:`rattlemap.bifurcation`, or an orbit of
-        :func:`rattlemap.orbit`.
+        ``ds["period"]``, ``ds["attractor"]``; two dimensions. Without the classes of its map, a variable cannot tell why a cell has
+        no value. Or a diagram of :func:`rattlemap.bifurcation`, or an orbit of :func:`rattlemap.orbit`.
     y
-        What to draw. Of a diagram: a component of the state at the walls, before contact, or a variable over the parameter, such
-        as ``"lyapunov"``, whose branches are lines; by default the first component that is not the same at all walls. Of an
-        orbit: a column of its trajectory against time; by default the velocity of the first gap against the gap.
+        What to draw. Of a map: one of the variables above, such as ``"pattern"``. Cells without a value have the names of the
+        program's figures: not periodic, undecided, failed, not known. Of a diagram: a component of the state at the walls, before
+        contact, or a variable over the parameter, such as ``"lyapunov"``, whose branches are lines; by default the first component
+        that is not the same at all walls. Of an orbit: a column of its trajectory against time; by default the velocity of the
+        first gap against the gap.
     ax
         Axes to draw on; by default the current ones.
     most
@@ -77,14 +82,14 @@ def plot(
     --------
     >>> ds = rm.map(rm.gear_pair(), e=(0, 1, 16), omega=(1, 12, 16), quantities=["class", "pattern"])
     >>> _ = rm.plot(ds)
-    >>> _ = rm.plot(ds["pattern"], most=8)
+    >>> _ = rm.plot(ds, y="pattern", most=8)
     >>> _ = rm.plot(rm.orbit(rm.gear_pair(), e=0.605, omega=5.6))
     """
     import matplotlib.pyplot as plt
     from matplotlib.text import Text
 
     is_diagram = isinstance(data, xr.Dataset) and "point" in data.dims
-    cells = _cell_names(data) if isinstance(data, xr.Dataset) and not is_diagram else data
+    cells = _cell_names(data, y) if isinstance(data, xr.Dataset) and not is_diagram else data
     if isinstance(cells, xr.DataArray) and cells.ndim != 2:
         raise ValueError(f"a map must have two dimensions; this has {cells.ndim}: {', '.join(map(str, cells.dims))}")
     inches = None if width is None else _inches(width)
@@ -208,8 +213,17 @@ def _legend_below(axes: Axes, handles: list[Artist], lines: list[str], inches: f
     figure.set_figheight(inches + rows * 1.5 * _POINTS / 72)
 
 
-def _cell_names(ds: xr.Dataset) -> xr.DataArray:
-    """Return the names of a Dataset's cells."""
+def _cell_names(ds: xr.Dataset, y: str | None) -> xr.DataArray:
+    """Return the names of a Dataset's cells, or the variable ``y`` with the classes of cells without a value."""
+    if y is not None:
+        if y not in ds:
+            raise ValueError(f"the map has no variable {y!r}; it has {', '.join(map(str, ds))}")
+        values = ds[y].astype(object) if ds[y].dtype.kind in "OU" else ds[y]
+        if "class" not in ds or values.dtype.kind != "O":
+            return values
+        without = {"chaotic": "not periodic", "quasi-periodic": "not periodic", "periodic": "not known"}
+        reasons = np.array([without.get(name, name) for name in ds["class"].values.ravel()], dtype=object)
+        return values.where(values != "", reasons.reshape(values.shape)).rename(y)
     if "attractor" in ds:
         return ds["attractor"]
     if "class" not in ds:
@@ -228,10 +242,10 @@ def _categories(cells: xr.DataArray, most: int) -> tuple[list[str], npt.NDArray[
     if values.dtype.kind in "iu":
         prefix = "attractor" if cells.name == "attractor" else str(cells.name)
         values = np.where(values < 0, "undecided", np.char.add(f"{prefix} ", values.astype(str)))
-        values = np.where(values == "period 0", "not periodic", values)
-    texts = pd.Series(values.ravel().astype(object)).replace("", "not periodic")
+        values = np.where(values == "period 0", _NO_VALUE, values)
+    texts = pd.Series(values.ravel().astype(object)).replace("", _NO_VALUE)
     counts = texts.value_counts()
-    last = [name for name in (*_WITHOUT_CYCLE, "not periodic") if name in counts.index]
+    last = [name for name in ("not known", "not periodic", *_WITHOUT_CYCLE, _NO_VALUE) if name in counts.index]
     rest = [name for name in counts.index if name not in last]
     if all(str(name).rpartition(" ")[2].isdecimal() for name in rest):
         rest.sort(key=lambda name: int(str(name).rpartition(" ")[2]))
@@ -248,7 +262,7 @@ def _color(name: str, place: int, variable: str) -> tuple[float, float, float]:
     """Return the colour of a name at this place of the legend."""
     named, in_a_row = _native.colors()
     kind, _, number = name.rpartition(" ")
-    if name == "not periodic":
+    if name in ("not periodic", _NO_VALUE):
         rgb = named["chaotic"]
     elif name in named and name != "rare":
         rgb = named[name]

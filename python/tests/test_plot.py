@@ -65,8 +65,22 @@ def test_the_most_frequent_words_have_names(ds: xr.Dataset, axes: Axes) -> None:
     lines = legend(axes)
     counts = ds["pattern"].to_series().value_counts().drop("")
     assert list(lines)[:4] == [text[1:] or "no events" for text in counts.index[:4]]
-    assert list(lines)[4:] == [f"{len(counts) - 4} others", "not periodic"]
+    assert list(lines)[4:] == [f"{len(counts) - 4} others", "not periodic or undecided"]
     assert lines["36"][1] == "#b4d0e8" and lines["no events"][1] == "#f2f2f2"
+
+
+def test_cells_without_a_pattern_have_the_names_of_their_classes(ds: xr.Dataset, axes: Axes) -> None:
+    classes = ds["class"].copy(deep=True)
+    classes.values[0, :4] = ["undecided", "failed", "chaotic", "periodic"]
+    pattern = ds["pattern"].copy(deep=True)
+    pattern.values[0, :4] = ""
+    rm.plot(ds.assign({"class": classes, "pattern": pattern}), y="pattern", ax=axes)
+    lines = legend(axes)
+    names = ["undecided", "failed", "not periodic", "not known"]
+    assert [cell_color(axes, (0, i)) for i in range(4)] == [lines[name][1] for name in names]
+    assert len({lines[name][1] for name in names}) == 4 and "not periodic or undecided" not in lines
+    with pytest.raises(ValueError, match="no variable 'moment'"):
+        rm.plot(ds, y="moment", ax=axes)
 
 
 def test_attractors_and_single_variables(ds: xr.Dataset, axes: Axes) -> None:

@@ -380,6 +380,11 @@ impl Scene {
         self.figure.scales.iter().find(|(name, _)| name == layer).map_or((None, None), |(_, scale)| *scale)
     }
 
+    /// Returns the layers that have contours, by name, and the numbers of the contours.
+    pub fn contours(&self) -> &[(String, Vec<f64>)] {
+        &self.figure.contours
+    }
+
     /// Returns the lines that figures of maps show.
     pub fn lines(&self) -> &[MapLine] {
         &self.figure.lines

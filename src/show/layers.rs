@@ -43,6 +43,7 @@ pub fn shared_colors() -> SharedColors {
         ("failed", colors::FAILED),
         ("quasi-periodic", colors::QUASI_PERIODIC),
         ("rare", words::RARE),
+        ("not known", words::NOT_KNOWN),
         ("right", wall_color(Side::Right)),
         ("left", wall_color(Side::Left)),
     ];
@@ -54,7 +55,7 @@ pub const CLASS: &str = "class";
 
 /// Returns the layers that the scene requests, the main layer first, patterns before words.
 pub fn of(cells: &Cells<'_>, words: &MapWords) -> Vec<Layer> {
-    let mut layers: Vec<Layer> = cells.basins().map(basins::layer).into_iter().collect();
+    let mut layers: Vec<Layer> = cells.basins().map(|of| basins::layer(cells, of)).into_iter().collect();
     if cells.has(Quantity::Class) {
         let classes = classes::layer(cells);
         layers.push(if layers.is_empty() { classes } else { Layer { name: CLASS.into(), ..classes } });

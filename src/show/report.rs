@@ -29,7 +29,7 @@ use crate::show::error::WriteError;
 use crate::show::layers::{Bar, Layer, NamedColor, share};
 use crate::show::provenance::Provenance;
 use crate::show::symbols::{axis_label, symbol};
-use crate::show::table::attractors_csv::attractor_name;
+use crate::show::table::attractors_csv::attractor_names;
 use crate::show::words::{MapWords, WordIndex};
 use crate::show::{caption, drawing, figure, refinement, replay, sketch};
 use rattlemap_dynamics::model::Parameter;
@@ -74,7 +74,7 @@ pub fn data(
 ) -> Value {
     let scene = cells.scene();
     let components = scene.base().state_names().len();
-    let attractors = cells.basins().into_iter().flat_map(|basins| basins.attractors().iter().enumerate());
+    let attractors = cells.basins().map_or(&[][..], |basins| basins.attractors());
     let spellings = |index: &Option<WordIndex>| index.as_ref().map_or(Vec::new(), WordIndex::spellings);
     let mut data = json!({
         "title": scene.title(),
@@ -114,7 +114,7 @@ pub fn data(
         "finishers": Finished::ALL.map(Finished::name),
         "words": spellings(&words.words),
         "patterns": spellings(&words.patterns),
-        "attractors": attractors.map(|(label, attractor)| attractor_name(label, attractor)).collect::<Vec<_>>(),
+        "attractors": attractor_names(attractors, &scene.base().state_names()),
         // Values of both axes at the strobe states of attractors.
         "marks": figure::map::attractors(cells),
         "refinement": cells.refinement().map(|refined| audits(cells, refined)),

@@ -73,6 +73,41 @@ pub(crate) fn superscript(sign: char) -> char {
     }
 }
 
+/// Returns a word in which a series of equal parts is a power: `(05)` with a raised 9, instead of nine times `05`.
+pub(crate) fn with_powers(word: &str) -> String {
+    // A hash has no parts.
+    if word.starts_with('#') {
+        return word.to_owned();
+    }
+    let (mut text, mut rest) = (String::new(), word);
+    while !rest.is_empty() {
+        let series = |length: usize| {
+            let part = &rest[..length];
+            let mut times = 1;
+            while rest[times * length..].starts_with(part) {
+                times += 1;
+            }
+            let exponent: String = times.to_string().chars().map(superscript).collect();
+            let power = if length == 1 { format!("{part}{exponent}") } else { format!("({part}){exponent}") };
+            ((times * length).saturating_sub(power.chars().count()), times * length, power)
+        };
+        match (1..=rest.len() / 2).map(series).max_by_key(|(saved, ..)| *saved) {
+            Some((saved, length, power)) if saved >= LEAST_SAVED => {
+                text += &power;
+                rest = &rest[length..];
+            }
+            _ => {
+                text += &rest[..1];
+                rest = &rest[1..];
+            }
+        }
+    }
+    text
+}
+
+/// Characters by which a power is at least shorter than its series.
+const LEAST_SAVED: usize = 3;
+
 /// Returns the digit or minus of a superscript.
 pub(crate) fn lowered(sign: char) -> Option<char> {
     "\u{2212}0123456789".chars().find(|&plain| superscript(plain) == sign)

@@ -301,7 +301,7 @@ fn write_pictures(
             .flat_map(|layer| names(&layer.name).into_iter().map(move |(f, name)| (layer, f, name)));
         let figures: Vec<_> = figures.filter(|(.., name)| wanted(name)).collect();
         let draw = |(layer, format, name): &(&Layer, Format, String)| {
-            folder.replace(name, |out| write_figure(out, *format, &figure::map::draw(cells, layer)))
+            folder.replace(name, |out| write_figure(out, *format, &figure::map::draw(cells, &layers, layer)))
         };
         match cells.count() > SIDE_BY_SIDE {
             true => figures.iter().try_for_each(draw)?,

@@ -22,7 +22,12 @@ impl<'a> Section<'a> {
     }
 
     /// Opens the table `node` at `path`; messages list the known names as `all`.
-    fn open_among(node: &'a Node, path: &str, known: &[&str], all: &str) -> Result<Self, SceneError> {
+    pub(crate) fn open_among(
+        node: &'a Node,
+        path: &str,
+        known: &[&str],
+        all: &str,
+    ) -> Result<Self, SceneError> {
         let Value::Table(table) = &node.value else {
             return Err(Field { path: path.to_owned(), node }.wrong_type(&format!("a table, [{path}]")));
         };

@@ -98,7 +98,7 @@ impl Window {
     pub fn figure(&self, records: &[u8], layer: &str) -> Result<String, String> {
         self.shown(records, |cells, layers, _| {
             let layer = layers.iter().find(|each| each.name() == layer).ok_or("no such layer")?;
-            Ok(svg(&figure::map::draw(cells, layer)))
+            Ok(svg(&figure::map::draw(cells, layers, layer)))
         })?
     }
 

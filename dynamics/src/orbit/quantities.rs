@@ -174,20 +174,21 @@ impl<'f> Meter<'f> {
         let of_gap = |gap: GapSums| GapQuantities {
             impacts_per_period: gap.impacts as f64 / (period - self.first_period) as f64,
             mesh_fraction: gap.contact_time / time,
-            impact_energy: gap.lost / time,
+            impact_energy: (gap.lost / time).max(0.0),
             contact_force: (gap.force_time > 0.0)
                 .then(|| [gap.force.high, (gap.force.square / gap.force_time).sqrt()]),
         };
         Quantities {
             approaches: [right, left, right.and(left)].map(Approaches::of),
-            impact_energy: sums.lost / time,
-            release_energy: self.flow.has_pushing_walls().then_some(sums.released / time),
+            // Rounding errors do not lead beyond the ranges.
+            impact_energy: (sums.lost / time).max(0.0),
+            release_energy: self.flow.has_pushing_walls().then_some((sums.released / time).max(0.0)),
             contact_force: (sums.contact_time > 0.0)
                 .then(|| [sums.force.high, (sums.force.square / sums.contact_time).sqrt()]),
             displacements: sums.displacements.map(|moments| Displacement::of(&moments, time)),
             dissipated: sums.dissipated / time,
             friction: self.flow.has_friction().then(|| FrictionQuantities {
-                sticking: sums.sticking_time / time,
+                sticking: (sums.sticking_time / time).min(1.0),
                 dissipated: sums.heat / time,
             }),
             gaps: (self.flow.gap_count() > 1).then(|| sums.gaps.map(of_gap)),

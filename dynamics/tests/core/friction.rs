@@ -91,6 +91,24 @@ fn a_block_that_sticks_for_ever_is_periodic() {
     assert!(near(of.sticking, 1.0, 1e-14) && of.dissipated == 0.0, "{of:?}");
 }
 
+/// Rounding errors do not lead beyond the ranges of a share and of an energy: in the first motion the block always sticks, in the
+/// second one it loses nothing in impacts.
+#[test]
+fn sticking_takes_at_most_the_whole_time_and_impacts_never_add_energy() {
+    for omega in [0.1, 0.7] {
+        let of = |rubbing: Rubbing, law| {
+            let flow = Flow::new(rubbing.form(law));
+            analyse_flow(&flow, law, state(&[0.15]), &Settings::default(), 8).quantities.unwrap()
+        };
+        let sticking = of(block(omega, 0.1, 0.3), LAW).friction.unwrap().sticking;
+        assert!(sticking <= 1.0, "omega = {omega}: {}", sticking - 1.0);
+        let pair = paper(1.0, omega).pair();
+        let law = Law { restitution: [1.0; 2], ..LAW };
+        let energy = of(Rubbing { pair, ..block(omega, 0.0, 1e-3) }, law).impact_energy;
+        assert!(energy >= 0.0, "omega = {omega}: {energy}");
+    }
+}
+
 /// On a belt of speed `s` the block sticks until the spring pulls with `f`. It then swings about `f`, meets the speed of the belt
 /// again at the mirrored time, and sticks. With equal friction in sticking and sliding, it stays at `x = f` after that.
 #[test]

@@ -132,6 +132,8 @@ pub(super) struct Figure {
     pub(super) diagram: DiagramStyle,
     /// Scales of layers by name.
     pub(super) scales: Vec<(String, LayerScale)>,
+    /// Numbers at which layers have contours, by name.
+    pub(super) contours: Vec<(String, Vec<f64>)>,
     /// Index of the gap whose contact the class map shows, if the scene names one of several.
     pub(super) gap: Option<usize>,
 }
@@ -177,18 +179,46 @@ pub(super) fn read(
         }
         gap = Some(field.choice(&known)?);
     }
-    let mut scales = Vec::new();
-    if let Some(field) = section.get("scale") {
-        let names = subjects(points.base());
-        let fixed = ["lyapunov", "impacts", "mesh"].map(str::to_owned);
-        let layers: Vec<String> =
-            quantities.iter().flat_map(|quantity| quantity.columns(&names)).chain(fixed).collect();
-        let known: Vec<&str> = layers.iter().map(String::as_str).collect();
-        for (name, field) in Section::open(field.node, &field.path, &known)?.fields() {
-            scales.push((name.to_owned(), read_scale(&field)?));
-        }
+    let names = subjects(points.base());
+    let numbers = quantities.iter().flat_map(|quantity| quantity.columns(&names));
+    let fixed = [Quantity::Lyapunov, Quantity::Impacts, Quantity::Mesh];
+    let scales = read_layers(&section, "scale", numbers.clone(), fixed, |_, field| read_scale(field))?;
+    let requested = fixed.into_iter().filter(|quantity| quantities.contains(quantity));
+    let contours = read_layers(&section, "contours", numbers, requested, |name, field| {
+        let scale = scales.iter().find(|(layer, _)| layer == name);
+        read_contours(field, scale.and_then(|(_, (factor, _))| *factor))
+    })?;
+    Ok(Figure { style, lines: lines.unwrap_or_default(), diagram, scales, contours, gap })
+}
+
+/// Reads a table whose keys are the names of layers of numbers.
+fn read_layers<T>(
+    section: &Section<'_>,
+    key: &str,
+    numbers: impl Iterator<Item = String>,
+    fixed: impl IntoIterator<Item = Quantity>,
+    read: impl Fn(&str, &Field<'_>) -> Result<T, SceneError>,
+) -> Result<Vec<(String, T)>, SceneError> {
+    let Some(field) = section.get(key) else { return Ok(Vec::new()) };
+    let layers: Vec<String> =
+        numbers.chain(fixed.into_iter().map(|quantity| quantity.name().to_owned())).collect();
+    let known: Vec<&str> = layers.iter().map(String::as_str).collect();
+    let all = format!("{}; request more in `outputs.quantities`", known.join(", "));
+    let table = Section::open_among(field.node, &field.path, &known, &all)?;
+    table.fields().map(|(name, field)| Ok((name.to_owned(), read(name, &field)?))).collect()
+}
+
+/// Reads the numbers at which a layer has contours. They have a place on its scale.
+fn read_contours(field: &Field<'_>, factor: Option<f64>) -> Result<Vec<f64>, SceneError> {
+    let items = field.list("a list of numbers, such as [1e-3, 1e-2]")?;
+    if !(1..=MOST_LINES).contains(&items.len()) {
+        return Err(field.wrong_count(items.len(), "numbers", &format!("1 to {MOST_LINES} numbers")));
     }
-    Ok(Figure { style, lines: lines.unwrap_or_default(), diagram, scales, gap })
+    let number = |item: &Field<'_>| match item.number()? {
+        number if place(factor, number).is_finite() => Ok(number),
+        _ => Err(item.out_of_range("finite, and above 0 on a scale that is not linear")),
+    };
+    items.iter().map(number).collect()
 }
 
 /// Reads the scale of a layer and the ends of its numbers.

@@ -105,6 +105,7 @@ pub const KEYS: &[Key] = &[
     key("figure", "panels", Words("all"), Takes::Words("a list of section, lyapunov, and names of requested quantities"), "panels of diagrams"),
     key("figure", "files", Value("\"pages\""), Takes::OneOf(&["pages", "panels"]), "pages: as many panels of a diagram in one figure as fit a page; panels: one figure for each panel. The second figure is bifurcation_2, and so on"),
     key("figure", "scale", Words("\"linear\", with ends from the numbers"), Takes::Words("{ LAYER = \"log\", ... }: linear, log or dB; ends such as [0, 2]; or both, such as [\"log\", 1e-6, 1]"), "colours of layers of numbers; 20 dB are a factor of 10"),
+    key("figure", "contours", KeyDefault::None, Takes::Words("{ LAYER = [NUMBER, ...], ... } of requested quantities, at most 32 numbers each"), "lines on the class map and on the layer itself, where its numbers have these values"),
     key("figure", "gap", Words("the first gap with an impact law, else the first"), Takes::Words("the name of a gap of a model with several gaps"), "gap whose contact the classes of period 1 tell"),
     key("figure", "lines", KeyDefault::None, Takes::Words("{ \"name\" = \"expression\", ... } with at most 32 names, in parameters of the model, also derived ones"), "lines on maps, where an expression is zero"),
 ];

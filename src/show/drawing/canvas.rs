@@ -279,7 +279,9 @@ impl Canvas {
     /// Returns the outlined rectangles: panels, colour bars, patches of legends.
     pub(crate) fn outlines(&self) -> Vec<Rect> {
         let outline = |item: &Item| match item {
-            Item::Line { path, .. } if path.len() == 5 && path[0] == path[4] => Some(extent(path)),
+            Item::Line { path, .. } if path.len() == 5 && path[0] == path[4] && path[0].0 == path[3].0 => {
+                Some(extent(path))
+            }
             _ => None,
         };
         self.items.borrow().iter().filter_map(outline).collect()

@@ -1,17 +1,18 @@
 //! A layer of a map as a picture: cells, lines, attractors, legend, colour bar.
 
 use std::cmp::Reverse;
+use std::f64::consts::PI;
 
-use crate::map::scene::{Axis, Target};
+use crate::map::scene::{Axis, Target, place};
 use crate::show::caption;
 use crate::show::cells::Cells;
-use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::Key;
-use crate::show::drawing::{Canvas, Color, DARK, Marker, Point, WHITE, wall_color};
+use crate::show::drawing::{Align, Canvas, Color, DARK, Marker, Point, Rect, SMALL, WHITE, wall_color};
 use crate::show::figure::map_layout::{LegendKey, LegendRow, MapFigure};
 use crate::show::figure::map_lines;
 use crate::show::layers::colors::{FAILED, HATCH, QUASI_PERIODIC, UNDECIDED};
-use crate::show::layers::{Layer, NamedColor, share};
+use crate::show::layers::{CLASS, Layer, NamedColor, share};
+use crate::show::symbols::number;
 use rattlemap_dynamics::model::{Side, State};
 
 /// Width of the legend, and least height of map and legend.
@@ -28,8 +29,8 @@ const ATTRACTOR: Marker = Marker { hollow: true, ..Marker::dot(DARK, 8.0) };
 /// Largest distance of an attractor from the plane of the starts, relative to its size.
 const IN_PLANE: f64 = 1e-9;
 
-/// Draws a layer.
-pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
+/// Draws one of the layers of a map.
+pub fn draw(cells: &Cells<'_>, layers: &[Layer], layer: &Layer) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
     let mut rows = rows(layer, cells.count());
@@ -41,6 +42,12 @@ pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
             .enumerate()
             .map(|(nth, line)| LegendRow::drawn(Key::Line { color: color(nth), width: LINE }, &line.name)),
     );
+    let contours = contours(cells, layers, layer);
+    for (nth, contour) in contours.iter().enumerate() {
+        let key = Key::Line { color: color(scene.lines().len() + nth), width: LINE };
+        let values: Vec<String> = contour.lines.iter().map(|(value, _)| number(*value)).collect();
+        rows.push(LegendRow::drawn(key, &format!("{}: {}", contour.name, values.join(", "))));
+    }
     let attractors = attractors(cells);
     if !attractors.is_empty() {
         rows.push(LegendRow::drawn(Key::Marker(ATTRACTOR), "attractor, at phase 0"));
@@ -63,13 +70,13 @@ pub fn draw(cells: &Cells<'_>, layer: &Layer) -> Canvas {
         },
         |canvas, frame| {
             for (nth, line) in scene.lines().iter().enumerate() {
-                draw_line(
-                    canvas,
-                    frame,
-                    &map_lines::zeros([&frame.x, &frame.y], line.function(scene.points())),
-                    color(nth),
-                );
+                let zeros = map_lines::zeros([&frame.x, &frame.y], line.function(scene.points()));
+                let at = |part: &Vec<Point>| part.iter().map(|(x, y)| frame.at(*x, *y)).collect();
+                draw_line(canvas, &zeros.iter().map(at).collect::<Vec<_>>(), color(nth));
             }
+            draw_contours(canvas, cells.counts(), frame.rect, &contours, |nth| {
+                color(scene.lines().len() + nth)
+            });
             attractors.iter().for_each(|(x, y)| canvas.marker(frame.at(*x, *y), ATTRACTOR));
         },
     )
@@ -101,11 +108,72 @@ fn rows(layer: &Layer, total: usize) -> Vec<LegendRow> {
 }
 
 /// Draws a line with a white rim, which separates it from cells of its own colour.
-fn draw_line(canvas: &Canvas, frame: &Frame, parts: &[Vec<Point>], color: Color) {
-    let parts: Vec<Vec<Point>> =
-        parts.iter().map(|part| part.iter().map(|(x, y)| frame.at(*x, *y)).collect()).collect();
+fn draw_line(canvas: &Canvas, parts: &[Vec<Point>], color: Color) {
     for (width, color) in [(RIM, WHITE), (LINE, color)] {
         parts.iter().for_each(|part| canvas.stroke(part, width, color));
+    }
+}
+
+/// Contours of a quantity.
+struct Contours<'a> {
+    name: &'a str,
+    /// Values and their lines, in columns and rows of cells.
+    lines: Vec<(f64, Vec<Vec<Point>>)>,
+}
+
+/// Returns the contours that a layer shows: its own, or all of them if its colours are classes.
+fn contours<'a>(cells: &Cells<'_>, layers: &'a [Layer], layer: &Layer) -> Vec<Contours<'a>> {
+    let scene = cells.scene();
+    let is_shown = |name: &str| layer.name == name || ["map", CLASS].contains(&&*layer.name);
+    let of = |(name, values): &(String, Vec<f64>)| {
+        let source = layers.iter().find(|layer| layer.name == *name && is_shown(name))?;
+        let (numbers, bar) = (source.numbers.as_ref()?, source.bar.as_ref()?);
+        let jump = if bar.is_angle() { PI } else { f64::INFINITY };
+        let at = |value: f64| place(scene.layer_scale(name).0, value);
+        let line = |&value: &f64| (value, map_lines::contours(cells.counts(), numbers, at(value), jump));
+        Some(Contours { name: &source.short, lines: values.iter().map(line).collect() })
+    };
+    scene.contours().iter().filter_map(of).collect()
+}
+
+/// Draws contours, and each value at its longest line, where no other value stands.
+fn draw_contours(
+    canvas: &Canvas,
+    counts: [usize; 2],
+    map: Rect,
+    contours: &[Contours<'_>],
+    color: impl Fn(usize) -> Color,
+) {
+    let unit = [(map.right - map.left) / counts[0] as f64, (map.bottom - map.top) / counts[1] as f64];
+    let at = |&(x, y): &Point| (map.left + (x + 0.5) * unit[0], map.bottom - (y + 0.5) * unit[1]);
+    let mut texts: Vec<(Rect, String)> = Vec::new();
+    for (nth, (value, parts)) in
+        contours.iter().enumerate().flat_map(|(nth, of)| of.lines.iter().map(move |line| (nth, line)))
+    {
+        let parts: Vec<Vec<Point>> = parts.iter().map(|part| part.iter().map(at).collect()).collect();
+        draw_line(canvas, &parts, color(nth));
+        let Some(longest) = parts.iter().max_by_key(|part| part.len()) else { continue };
+        let text = number(*value);
+        let half = (0.5 * canvas.text_width(&text, SMALL) + 4.0, 14.0);
+        let around = |&(x, y): &Point| {
+            let x = x.clamp(map.left + half.0, map.right - half.0);
+            Rect::around((x, y.clamp(map.top + half.1, map.bottom - half.1)), half)
+        };
+        let is_free = |place: &Rect| {
+            let apart = |[a, b]: [f64; 2], [c, d]: [f64; 2]| b <= c || d <= a;
+            texts.iter().all(|(other, _)| {
+                apart([place.left, place.right], [other.left, other.right])
+                    || apart([place.top, place.bottom], [other.top, other.bottom])
+            })
+        };
+        let (before, after) = longest.split_at(longest.len() / 2);
+        let from_middle = after.iter().chain(before.iter().rev());
+        texts.extend(from_middle.map(around).find(is_free).map(|place| (place, text)));
+    }
+    for (place, text) in texts {
+        canvas.fill(place, WHITE, 0.85);
+        let middle = (0.5 * (place.left + place.right), 0.5 * (place.top + place.bottom));
+        canvas.text(&text, middle, SMALL, Align::Center, DARK);
     }
 }
 
@@ -156,7 +224,7 @@ mod tests {
         let records = vec![Record::default(); plan.run_count()];
         let cells = Cells::new(&scene, &plan, &records);
         let mut bytes = Vec::new();
-        write_figure(&mut bytes, format, &draw(&cells, layer)).unwrap();
+        write_figure(&mut bytes, format, &draw(&cells, &[], layer)).unwrap();
         bytes
     }
 

@@ -1,4 +1,4 @@
-//! Lines on a map: the zeros of a function of the two axes, by marching squares.
+//! Lines on a map, by marching squares: the zeros of a function of the two axes, and contours of numbers of cells.
 
 use std::collections::HashMap;
 
@@ -22,8 +22,8 @@ pub(crate) fn zeros([x, y]: [&Axis; 2], function: impl Fn([f64; 2]) -> f64) -> V
     let values: Vec<f64> =
         (0..=SQUARES).flat_map(|j| (0..=SQUARES).map(move |i| [i, j])).map(|[i, j]| corner(i, j)).collect();
     let value = |[i, j]: [usize; 2]| values[j * (SQUARES + 1) + i];
-    let crossing = |([i, j], is_upwards): Edge| {
-        let end = if is_upwards { [i, j + 1] } else { [i + 1, j] };
+    joined([SQUARES; 2], |edge| {
+        let ([i, j], end) = ends(edge);
         let (a, b) = (value([i, j]), value(end));
         if !(a.is_finite() && b.is_finite()) || (a < 0.0) == (b < 0.0) {
             return None;
@@ -40,10 +40,36 @@ pub(crate) fn zeros([x, y]: [&Axis; 2], function: impl Fn([f64; 2]) -> f64) -> V
         let [x, y] = at(high);
         // At a pole the sign changes, too.
         (function([x, y]).abs() <= a.abs().max(b.abs())).then_some((x, y))
-    };
+    })
+}
+
+/// Returns the lines on which numbers at the centres of cells have a value, in columns and rows from the first centre. Beside cells
+/// without a number, and where neighbours differ by `jump` or more, lines end.
+pub(crate) fn contours(
+    [columns, rows]: [usize; 2],
+    numbers: &[f32],
+    value: f64,
+    jump: f64,
+) -> Vec<Vec<Point>> {
+    let above = |[i, j]: [usize; 2]| f64::from(numbers[j * columns + i]) - f64::from(value as f32);
+    joined([columns - 1, rows - 1], |edge| {
+        let (start, end) = ends(edge);
+        let (a, b) = (above(start), above(end));
+        let along = |k: usize| start[k] as f64 + a / (a - b) * (end[k] as f64 - start[k] as f64);
+        ((a < 0.0) != (b < 0.0) && (a - b).abs() < jump).then(|| (along(0), along(1)))
+    })
+}
+
+/// Returns both corners of an edge.
+fn ends(([i, j], is_upwards): Edge) -> ([usize; 2], [usize; 2]) {
+    ([i, j], if is_upwards { [i, j + 1] } else { [i + 1, j] })
+}
+
+/// Joins the points at which edges of squares are crossed to lines.
+fn joined([columns, rows]: [usize; 2], crossing: impl Fn(Edge) -> Option<Point>) -> Vec<Vec<Point>> {
     let mut points: HashMap<Edge, Point> = HashMap::new();
     let mut next: HashMap<Edge, Vec<Edge>> = HashMap::new();
-    for [i, j] in (0..SQUARES).flat_map(|j| (0..SQUARES).map(move |i| [i, j])) {
+    for [i, j] in (0..rows).flat_map(|j| (0..columns).map(move |i| [i, j])) {
         // Counterclockwise, so that consecutive crossings belong together.
         let edges = [([i, j], false), ([i + 1, j], true), ([i, j + 1], false), ([i, j], true)];
         let crossed: Vec<Edge> = edges
@@ -104,6 +130,20 @@ mod tests {
         let [line] = &lines[..] else { panic!("{} lines", lines.len()) };
         assert_eq!(line[0], line[line.len() - 1]);
         assert!(line.iter().all(|(x, y)| ((x - 1.0).hypot(y.log10()) - 0.5).abs() < 1e-12));
+    }
+
+    #[test]
+    fn contours_are_interpolated_and_end_beside_cells_without_a_number() {
+        let numbers: Vec<f32> = (0..30).map(|id| (id % 6 * 2 + id / 6) as f32).collect();
+        let [line] = &contours([6, 5], &numbers, 5.0, f64::INFINITY)[..] else { panic!() };
+        assert!(line.iter().all(|(x, y)| (2.0 * x + y - 5.0).abs() < 1e-12), "{line:?}");
+        assert_eq!([line[0], line[line.len() - 1]].map(|(_, y)| y), [4.0, 0.0]);
+        let mut broken = numbers.clone();
+        broken[2 * 6 + 1] = f32::NAN;
+        let parts = contours([6, 5], &broken, 5.0, f64::INFINITY);
+        let is_near = |(x, y): &Point| (x - 1.0).abs() < 1.0 && (y - 2.0).abs() < 1.0;
+        assert_eq!(parts.iter().flatten().filter(|&point| is_near(point)).count(), 0, "{parts:?}");
+        assert!(contours([6, 5], &numbers, 5.0, 1.0).is_empty(), "an angle that jumps");
     }
 
     #[test]

@@ -130,7 +130,8 @@ const PLANE: &str = "title = 'Gear rattle: restitution x excitation frequency'\n
     [[axis]]\nparameter = 'e'\nmin = 0.0\nmax = 1.0\ncount = 30\n\
     [[axis]]\nparameter = 'omega'\nmin = 1.0\nmax = 12.0\ncount = 40\n\
     [outputs]\nquantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern']\n\
-    [figure]\nlines = { 'rattle threshold' = 'omega - 2 - 8*e' }\n";
+    [figure]\nlines = { 'rattle threshold' = 'omega - 2 - 8*e' }\n\
+    contours = { impacts = [3e-7, 8.5e-7], mesh = [0.5] }\n";
 
 /// Returns records with many periods, words and chaos, none of them computed.
 fn records(plan: &Plan) -> Vec<Record> {
@@ -177,8 +178,11 @@ fn maps_fit_a_page() {
         let cells = Cells::new(&scene, &plan, &records);
         let layers = layers::of(&cells, &words::read(&cells));
         assert_eq!(layers.len(), 6);
-        for layer in layers {
-            check(&format!("{} {style:?}", layer.name), &map::draw(&cells, &layer), false);
+        for layer in &layers {
+            let canvas = map::draw(&cells, &layers, layer);
+            check(&format!("{} {style:?}", layer.name), &canvas, true);
+            let values = canvas.texts().iter().filter(|(text, ..)| text.parse() == Ok(8.5e-7)).count();
+            assert_eq!(values, usize::from(["map", "impacts"].contains(&layer.name())), "{}", layer.name);
         }
     }
 }
@@ -203,7 +207,7 @@ fn basins_fit_a_page_and_mark_their_attractors() {
         let is_there = |(a, b): &(f64, f64)| (a - x).hypot(b - v) < 1e-9;
         assert!(map::attractors(&cells).iter().any(is_there), "{x} {v}");
         for layer in layers::of(&cells, &words::read(&cells)) {
-            check(&format!("basins {} {style:?}", layer.name), &map::draw(&cells, &layer), false);
+            check(&format!("basins {} {style:?}", layer.name), &map::draw(&cells, &[], &layer), false);
         }
     }
 }

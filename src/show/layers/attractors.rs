@@ -1,7 +1,7 @@
 //! The layer of the number of coexisting attractors.
 
 use crate::show::color::Color;
-use crate::show::layers::colors::{self, NO_VALUE};
+use crate::show::layers::colors::{self, UNDECIDED};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
 
 /// Colour of cells with one attractor, which are the most common.
@@ -37,7 +37,7 @@ pub(crate) fn layer(counts: &[u8]) -> Layer {
 
 fn color(count: u32) -> Color {
     match count {
-        0 => NO_VALUE,
+        0 => UNDECIDED,
         1 => ONE_ATTRACTOR,
         count => colors::period(count),
     }

@@ -29,6 +29,11 @@ impl Bar {
         Axis::exact(&self.label, self.low, self.high)
     }
 
+    /// Whether the numbers are angles: both ends have one colour.
+    pub(crate) fn is_angle(&self) -> bool {
+        self.colors.first() == self.colors.last()
+    }
+
     /// Returns numbers and the indices of their colours: both ends, and zero if there are negative numbers. Between them, indices
     /// are linear.
     pub(crate) fn anchors(&self) -> Vec<(f64, f64)> {

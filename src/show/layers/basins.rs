@@ -1,10 +1,11 @@
 //! The main layer of a map of basins: the attractor that each start leads to.
 
 use crate::findings::attractors::{Attractor, Basins, NONE};
+use crate::show::cells::Cells;
 use crate::show::color::Color;
 use crate::show::layers::colors::{self, CHAOTIC, NO_VALUE, QUASI_PERIODIC, SYMMETRIC, UNDECIDED};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
-use crate::show::table::attractors_csv::attractor_name;
+use crate::show::table::attractors_csv::attractor_names;
 use rattlemap_dynamics::orbit::Class;
 
 /// Numbers of attractors with a colour of their own, and with an entry of their own in the legend.
@@ -18,8 +19,9 @@ const UNKNOWN_INDEX: u8 = CHAOS_INDEX + 1;
 const TORUS_INDEX: u8 = UNKNOWN_INDEX + 1;
 
 /// Returns the layer.
-pub(crate) fn layer(basins: &Basins) -> Layer {
+pub(crate) fn layer(cells: &Cells<'_>, basins: &Basins) -> Layer {
     let list = basins.attractors();
+    let names = attractor_names(list, &cells.scene().base().state_names());
     let index = |label: usize| match list[label].class {
         Class::Chaotic => CHAOS_INDEX,
         Class::QuasiPeriodic => TORUS_INDEX,
@@ -33,9 +35,9 @@ pub(crate) fn layer(basins: &Basins) -> Layer {
         .chain([NO_VALUE, CHAOTIC, UNDECIDED, QUASI_PERIODIC])
         .collect();
     let color = |label: usize| palette[usize::from(index(label))];
-    let entry = |(label, attractor): (usize, &_)| NamedColor {
+    let entry = |(label, attractor): (usize, &Attractor)| NamedColor {
         color: color(label),
-        text: attractor_name(label, attractor),
+        text: names[label].clone(),
         cells: attractor.cells,
     };
     let is_listed = |(label, attractor): &(usize, &Attractor)| {

@@ -26,8 +26,8 @@ const SHADES: u8 = 64;
 /// Forcing periods T to which the legend refers the rate at which chaos ends.
 const PERIODS: u32 = 1000;
 
-/// Number of periods in the legend before the others are combined in one entry.
-const LISTED_PERIODS: usize = 17;
+/// Longest period with an entry of its own in the legend. Longer ones share one, because no more colours differ from all others.
+pub(crate) const LISTED_PERIOD: usize = 12;
 
 /// Returns the layer.
 pub(crate) fn layer(cells: &Cells<'_>) -> Layer {
@@ -119,7 +119,7 @@ fn palette() -> Vec<Color> {
     palette
 }
 
-/// Returns the legend: low periods first, then chaos, quasi-periodic, undecided and failed.
+/// Returns the legend: short periods first, then chaos, quasi-periodic, undecided and failed.
 fn entries(
     indices: &[u8],
     palette: &[Color],
@@ -147,17 +147,15 @@ fn entries(
         entry(2, "period 1, unsymmetric".to_owned()),
         entry(3, "period 1, symmetry unknown".to_owned()),
     ];
-    let periods = usize::from(FIRST_PERIOD)..usize::from(EXCEPTIONS);
-    list.extend(
-        periods.map(|index| entry(index, format!("period {}", index - usize::from(FIRST_PERIOD) + 2))),
-    );
-    list = legend(list);
-    if list.len() > LISTED_PERIODS + 1 {
-        let rest: usize = list[LISTED_PERIODS..].iter().map(|entry| entry.cells).sum();
-        let color = list[LISTED_PERIODS].color;
-        list.truncate(LISTED_PERIODS);
-        list.push(NamedColor { color, text: "longer, a colour each".to_owned(), cells: rest });
+    let period = |period: usize| entry(usize::from(FIRST_PERIOD) + period - 2, format!("period {period}"));
+    list.extend((2..=LISTED_PERIOD).map(period));
+    let mut longer = legend((LISTED_PERIOD + 1..=64).map(period));
+    if longer.len() > 1 {
+        let text = format!("periods above {LISTED_PERIOD}, a colour each");
+        let cells = longer.iter().map(|entry| entry.cells).sum();
+        longer = vec![NamedColor { text, cells, ..longer.swap_remove(0) }];
     }
+    list.extend(longer);
     let chaos = counts[FIRST_SHADE.into()..].iter().sum();
     let middle = if shows_chaos { usize::from(FIRST_SHADE + SHADES / 2) } else { palette.len() - 1 };
     let exceptions = usize::from(EXCEPTIONS);
@@ -166,4 +164,16 @@ fn entries(
     list.push(entry(exceptions, "undecided".to_owned()));
     list.push(entry(exceptions + 1, "failed".to_owned()));
     legend(list)
+}
+
+#[test]
+fn long_periods_share_one_row() {
+    let rows = |periods: &[u8]| -> Vec<String> {
+        let indices: Vec<u8> = periods.iter().map(|period| FIRST_PERIOD + period - 2).collect();
+        let list = entries(&indices, &palette(), ("chaos".to_owned(), None), false, false);
+        list.into_iter().map(|entry| format!("{} {}", entry.text, entry.cells)).collect()
+    };
+    assert_eq!(rows(&[12, 24, 2, 24]), ["period 2 1", "period 12 1", "period 24 2"]);
+    let all: Vec<u8> = (2..=64).collect();
+    assert_eq!(rows(&all)[10..], ["period 12 1", "periods above 12, a colour each 52"]);
 }

@@ -16,18 +16,18 @@ pub(crate) const SYMMETRY_UNKNOWN: Color = hex(0x546f90);
 /// Period 1 that never leaves contact.
 pub(crate) const ALWAYS_IN_CONTACT: Color = hex(0xebaac8);
 
-/// Colours of the items of a list, such as periods from 2 on, or words by frequency. An annealing search chose them so that
-/// neighbours in a legend differ, also for people who cannot see red or green. A test measures the differences.
+/// Colours of the items of a list, such as periods from 2 on, or words by frequency. A search chose them so that neighbours in a legend
+/// differ, also for people who cannot see red or green: each of the first 11 differs from all others. A test measures the differences.
 #[rustfmt::skip]
 const DISTINCT: [Color; 63] = [
     hex(0xe6a700), hex(0x059d76), hex(0xe26a38), hex(0xf2ea30), hex(0x01569d), hex(0xba7db8), hex(0x8d5d31), hex(0x6fdcae),
-    hex(0x2f0692), hex(0xd3e98f), hex(0xf15a76), hex(0x9e2854), hex(0x58c7c8), hex(0x176caa), hex(0x50190f), hex(0xe8aa70),
-    hex(0x3b114d), hex(0x165470), hex(0x64b1a0), hex(0x1f908d), hex(0x7e2733), hex(0x975e57), hex(0x600f3c), hex(0x9e1073),
-    hex(0x28bf90), hex(0xbd6014), hex(0x92f2b2), hex(0x138968), hex(0x53a29f), hex(0xd94667), hex(0x8e453e), hex(0x84285a),
-    hex(0x77d1ba), hex(0xf3814f), hex(0xe4ce4b), hex(0xaa6c43), hex(0x86d1f4), hex(0x7a163c), hex(0xa36782), hex(0x13db92),
-    hex(0xf4f470), hex(0x197eab), hex(0x581971), hex(0x993516), hex(0x77b7d1), hex(0x459c85), hex(0x65112a), hex(0x76ab53),
-    hex(0x1292a0), hex(0x36349d), hex(0x7bc8bf), hex(0x8d4e69), hex(0x408715), hex(0xc5a178), hex(0xf7549a), hex(0x7f3c2a),
-    hex(0x7ba8d7), hex(0x751455), hex(0xe48422), hex(0xa18757), hex(0xaa468c), hex(0x77bca1), hex(0xcd8bb9),
+    hex(0x2f0692), hex(0xd3e98f), hex(0xf15a76), hex(0x9e2854), hex(0x006054), hex(0x8a9c9c), hex(0xa842fc), hex(0x3c180c),
+    hex(0x3b114d), hex(0x4e4866), hex(0xa2909c), hex(0x666654), hex(0x7e7efc), hex(0x002448), hex(0x664e48), hex(0x184854),
+    hex(0x008af6), hex(0x606066), hex(0x485afc), hex(0x6ca89c), hex(0x486666), hex(0x3c543c), hex(0x844242), hex(0x84285a),
+    hex(0x2a243c), hex(0xe41ede), hex(0x364254), hex(0x78606c), hex(0x8466cc), hex(0x5a4e3c), hex(0x603c5a), hex(0x5a0006),
+    hex(0xae72f6), hex(0x002a3c), hex(0x2a72f0), hex(0xae5ac6), hex(0x4e544e), hex(0x96969c), hex(0x485a66), hex(0x066066),
+    hex(0x845a54), hex(0x241e4e), hex(0x5a4e5a), hex(0x8d4e69), hex(0x6c605a), hex(0x422a4e), hex(0xb48a9c), hex(0x6c4854),
+    hex(0x546654), hex(0x751455), hex(0x608af6), hex(0x9c4e5a), hex(0x303654), hex(0x0c3c5a), hex(0x540048),
 ];
 
 /// Chaos in layers that do not show its exponent.
@@ -132,6 +132,7 @@ fn between(anchors: &[Color], share: f64) -> Color {
 mod tests {
     use super::*;
     use crate::show::color_difference::least_difference;
+    use crate::show::layers::classes::LISTED_PERIOD;
 
     #[test]
     fn periods_have_different_colours() {
@@ -162,31 +163,32 @@ mod tests {
         };
         let kinds = [NO_CONTACT, ALWAYS_IN_CONTACT, SYMMETRIC, UNSYMMETRIC, SYMMETRY_UNKNOWN];
         let legend: Vec<Color> = kinds.into_iter().chain((2..=64).map(period)).collect();
-        // A legend lists only periods that occur. Periods up to 12 may be neighbours of any other, longer ones only of those
-        // that differ by up to 4.
-        let usual = kinds.len() + 11;
-        let near = |i: usize, j: usize| i < j && (j < usual || j - i <= 4);
-        let all = |near: &dyn Fn(usize, usize) -> bool| {
-            let pairs = (0..legend.len()).flat_map(|i| (0..legend.len()).map(move |j| (i, j)));
-            pairs.filter(|(i, j)| near(*i, *j)).map(|(i, j)| (legend[i], legend[j])).collect::<Vec<_>>()
-        };
-        least(all(&near));
+        // A legend lists only periods that occur, so that any two of them may be neighbours. The long ones share a row.
+        let listed = kinds.len() + LISTED_PERIOD - 1;
+        let pairs = (0..listed).flat_map(|i| (i + 1..legend.len()).map(move |j| (i, j)));
+        least(pairs.map(|(i, j)| (legend[i], legend[j])).collect());
+        // Lists of words and basins have consecutive colours, and at most 20 rows.
+        let near = (1..20).flat_map(|i| (i + 1..=i + 4).map(move |j| (i, j)));
+        least(near.map(|(i, j)| (distinct(i), distinct(j))).collect());
+        // The row of chaos has the middle colour of its ramp.
         let greys = (0..=20).map(|step| chaos(f64::from(step) / 20.0));
-        let others: Vec<Color> = legend.iter().copied().chain(greys).chain([FAILED]).collect();
+        let others: Vec<Color> = legend.iter().copied().chain(greys).collect();
         // One of the two colours of a hatching is enough.
         let farther = |color: Color| {
             [UNDECIDED, HATCH]
                 .into_iter()
                 .max_by(|a, b| least_difference(color, *a).total_cmp(&least_difference(color, *b)))
         };
-        let hatched = others.iter().chain(&[QUASI_PERIODIC]).map(|&color| (color, farther(color).unwrap()));
+        let hatched =
+            others.iter().chain(&[QUASI_PERIODIC, FAILED]).map(|&color| (color, farther(color).unwrap()));
         least(hatched.collect());
-        least(others.iter().map(|color| (*color, QUASI_PERIODIC)).collect());
-        let exceptions =
-            legend[..usual].iter().copied().chain((0..=20).map(|step| chaos(f64::from(step) / 20.0)));
-        least(exceptions.map(|color| (color, FAILED)).collect());
-        // The legend entry of chaos has the middle colour of its ramp. It follows at most 17 periods.
-        least(legend[..kinds.len() + 17].iter().map(|color| (*color, chaos(0.5))).collect());
+        least(
+            [QUASI_PERIODIC, FAILED]
+                .iter()
+                .flat_map(|&last| others.iter().map(move |&c| (c, last)))
+                .collect(),
+        );
+        least(legend.iter().map(|color| (*color, chaos(0.5))).chain([(FAILED, QUASI_PERIODIC)]).collect());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use crate::show::color::Color;
 use crate::show::layers::colors::{self, CHAOTIC, distinct};
 use crate::show::layers::layer::{Layer, NamedColor, legend};
+use crate::show::symbols::with_powers;
 use crate::show::words::{APERIODIC, FAILED, UNDECIDED, UNKNOWN, WordIndex};
 
 /// Numbers of words with an entry of their own in the legend, and with a colour of their own.
@@ -24,7 +25,7 @@ const FIRST_WORD: u8 = 1 + WITHOUT_WORD.len() as u8;
 pub(crate) const WITHOUT_EVENTS: Color = [0xf2, 0xf2, 0xf2];
 pub(crate) const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
 pub(crate) const RARE: Color = [0x5a, 0x5a, 0x5a];
-const NOT_KNOWN: Color = [0xc4, 0xc4, 0xc4];
+pub(crate) const NOT_KNOWN: Color = [0xc4, 0xc4, 0xc4];
 
 /// Texts of a layer.
 struct Texts {
@@ -88,7 +89,7 @@ fn entries(
 ) -> Vec<NamedColor> {
     let entry = |(number, spelling): (usize, &String)| NamedColor {
         color: color(number),
-        text: if spelling.is_empty() { "no events".to_owned() } else { spelling.clone() },
+        text: if spelling.is_empty() { "no events".to_owned() } else { with_powers(spelling) },
         cells: words.list[number].1,
     };
     let mut list: Vec<NamedColor> = spellings.iter().enumerate().take(LISTED_WORDS).map(entry).collect();
