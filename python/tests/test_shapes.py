@@ -25,7 +25,7 @@ motion.force = [1, 0]
 motion.frequency = "omega"
 motion.gap = { a = [1, 0], domains = [0, 1] }
 friction = [{ row = [0, 1], force = 0.1 }]
-signal = [{ name = "event_sum", velocity = [1, 1], acceleration = [0, 1], cos = 1 }]
+signal = [{ name = "sum_of_rates", velocity = [1, 1], acceleration = [0, 1], cos = 1 }]
 [[contact]]
 gap = "a"
 side = "right"

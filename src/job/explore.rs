@@ -62,7 +62,8 @@ pub fn page(
     }
     let map = run.finish();
     let (cells, words) = (map.cells(), words::read(&map.cells()));
-    let mut data = report::data(&cells, &map.description().made, &layers::of(&cells, &words), &words, None);
+    let mut data =
+        report::sketched(&cells, &map.description().made, &layers::of(&cells, &words), &words, None);
     data["live"]["at_once"] = true.into();
     let mut page = Vec::new();
     report::write(&mut page, &data).map_err(|error| JobError::Failed(error.to_string()))?;

@@ -64,6 +64,20 @@ const ENGINE: &[u8] = &[];
 #[cfg(target_arch = "wasm32")]
 const WORKER: &str = "";
 
+/// Returns the data of the page with a sketch of the model. The page's engine, which only computes views, calls [`data`].
+pub fn sketched(
+    cells: &Cells<'_>,
+    made: &Provenance<'_>,
+    layers: &[Layer],
+    words: &MapWords,
+    validation: Option<&Value>,
+) -> Value {
+    let mut data = data(cells, made, layers, words, validation);
+    let model = cells.scene().base().downcast_ref::<FileModel>();
+    data["sketch"] = model.map(|model| packed("u8", drawing::svg(&sketch::draw(model)).as_bytes())).into();
+    data
+}
+
 /// Returns the data of the page, with those of the validation if there was one.
 pub fn data(
     cells: &Cells<'_>,
@@ -91,7 +105,6 @@ pub fn data(
         "model": scene.base().title(),
         "source": scene.base().source(),
         "equations": scene.base().downcast_ref::<FileModel>().map(FileModel::equations),
-        "sketch": scene.base().downcast_ref::<FileModel>().map(|model| drawing::svg(&sketch::draw(model))),
         "letters": letters_in_words(scene.base()),
         // The scene without its axes, to which the page adds those of the view, and the command that computes it.
         "scene": scene.settings(),

@@ -75,9 +75,9 @@ pub(crate) fn draw(model: &FileModel) -> Canvas {
         y += 0.4 * LINE;
     }
     for text in lines_of("friction  ") {
-        canvas.outline(Rect { left: 6.0, top: y - 14.0, right: 46.0, bottom: y + 10.0 }, 2.0);
-        hatch(&canvas, [(0.0, y + 12.0), (52.0, y + 12.0)], (-8.0, 8.0));
-        y = write(&format!("dry friction {text}"), (64.0, y), DARK) + 0.4 * LINE;
+        canvas.outline(Rect { left: 14.0, top: y - 14.0, right: 54.0, bottom: y + 10.0 }, 2.0);
+        hatch(&canvas, [(8.0, y + 12.0), (60.0, y + 12.0)], (-8.0, 8.0));
+        y = write(&format!("dry friction {text}"), (72.0, y), DARK) + 0.4 * LINE;
     }
     let phases: Vec<f64> =
         definition.motion.stages.iter().map(|phase| phase.evaluate(&|i| model.value(i))).collect();

@@ -310,7 +310,7 @@ fn write_pictures(
         files.extend(figures.into_iter().map(|(.., name)| name));
     }
     if wants_page {
-        let data = report::data(cells, made, &layers, words, validation);
+        let data = report::sketched(cells, made, &layers, words, validation);
         folder.replace(REPORT, |out| report::write(out, &data))?;
         files.push(REPORT.to_owned());
     }

@@ -69,7 +69,8 @@ impl Browser {
         found["result"]["value"].clone()
     }
 
-    fn until(&mut self, expression: &str) {
+    /// Waits until an expression is true.
+    pub(crate) fn until(&mut self, expression: &str) {
         let begun = Instant::now();
         while self.value(expression) != true {
             assert!(begun.elapsed() < Duration::from_secs(60), "{expression} did not become true");

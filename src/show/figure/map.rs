@@ -136,7 +136,7 @@ fn contours<'a>(cells: &Cells<'_>, layers: &'a [Layer], layer: &Layer) -> Vec<Co
     scene.contours().iter().filter_map(of).collect()
 }
 
-/// Draws contours, and each value at its longest line, where no other value stands.
+/// Draws contours, and each value at its longest line on which no other value stands.
 fn draw_contours(
     canvas: &Canvas,
     counts: [usize; 2],
@@ -150,9 +150,9 @@ fn draw_contours(
     for (nth, (value, parts)) in
         contours.iter().enumerate().flat_map(|(nth, of)| of.lines.iter().map(move |line| (nth, line)))
     {
-        let parts: Vec<Vec<Point>> = parts.iter().map(|part| part.iter().map(at).collect()).collect();
+        let mut parts: Vec<Vec<Point>> = parts.iter().map(|part| part.iter().map(at).collect()).collect();
         draw_line(canvas, &parts, color(nth));
-        let Some(longest) = parts.iter().max_by_key(|part| part.len()) else { continue };
+        parts.sort_by_key(|part| Reverse(part.len()));
         let text = number(*value);
         let half = (0.5 * canvas.text_width(&text, SMALL) + 4.0, 14.0);
         let around = |&(x, y): &Point| {
@@ -166,9 +166,12 @@ fn draw_contours(
                     || apart([place.top, place.bottom], [other.top, other.bottom])
             })
         };
-        let (before, after) = longest.split_at(longest.len() / 2);
-        let from_middle = after.iter().chain(before.iter().rev());
-        texts.extend(from_middle.map(around).find(is_free).map(|place| (place, text)));
+        let from_middle = |part: &Vec<Point>| {
+            let (before, after) = part.split_at(part.len() / 2);
+            after.iter().chain(before.iter().rev()).map(around).find(is_free)
+        };
+        let place = parts.iter().find_map(from_middle);
+        texts.extend(place.map(|place| (place, text)));
     }
     for (place, text) in texts {
         canvas.fill(place, WHITE, 0.85);

@@ -22,7 +22,7 @@ interface MapData {
   source: string | null;
   equations: string[] | null;
   // SVG.
-  sketch: string | null;
+  sketch?: Packed | null;
   letters: string | null;
   scene: string;
   compute: string;

@@ -15,7 +15,7 @@ async function start() {
   byId("equations").hidden = !map.equations?.length;
   byId("equations").textContent = (map.equations ?? []).join("\n");
   byId("sketch").hidden = !map.sketch;
-  if (map.sketch) byId("sketch").src = URL.createObjectURL(new Blob([map.sketch], { type: "image/svg+xml" }));
+  if (map.sketch) byId("sketch").src = URL.createObjectURL(new Blob([await unpack(map.sketch)], { type: "image/svg+xml" }));
   if (map.values.word || map.values.pattern) byId("letters").textContent = map.letters ?? "";
   byId("layers").append(...map.layers.map(({ short }, k) => {
     const button = element("button", short);
