@@ -43,6 +43,7 @@ use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};
+use crate::motion::Slips;
 use crate::named;
 use crate::word::Word;
 
@@ -84,6 +85,8 @@ pub struct SlipPoint {
     pub t_mod_period: f64,
     /// State.
     pub state: State,
+    /// Modes of all elements after the change.
+    pub slips: Slips,
 }
 
 /// The class of a motion.

@@ -68,28 +68,32 @@ fn change_force() -> Jump {
         crossing.is_smooth = true;
     }
     if MEASURE {
-        measure_push();
+        measure_push(flows[cell.flow_index].push);
     }
     return Jump(true, MODE_PASSING, ALONG_GAP, 0.0, 1.0, 0.0, 0.0);
 }
 
-// Measures the energy of the wall's spring and preload if contact ends or begins behind the wall.
-fn measure_push() {
+// Measures the energy of the wall's spring and preload, of these forces, if contact ends or begins behind the wall.
+fn measure_push(push: array<Real, 3>) {
     let side = side_of_interval();
     let at = walls[1u - side];
-    let push = flows[cell.flow_index].push;
     let sign = select(Real(1.0), Real(-1.0), is_open());
     let depth = abs(motion.q[0] - at);
     let preload = sign * (push[2] + push[0] * at);
     add(SUM_RELEASED, sign * (abs(push[0]) * depth + 2.0 * preload) * depth);
 }
 
-// Enters open or closed contact where the force has the wrong sign for the present interval.
-fn settle_force() {
+// Enters open or closed contact where the force has the wrong sign for the present interval. `before` are the forces of the wall before a
+// change of the stage.
+fn settle_force(before: array<Real, 3>) {
     if watches_force() && force_inside(motion.q) < 0.0 {
         let side = side_of_interval();
         if MEASURE {
-            measure_push();
+            var push = before;
+            if is_open() {
+                push = flows[cell.flow_index].push;
+            }
+            measure_push(push);
         }
         count_event(side);
         pass_wall(side);

@@ -67,6 +67,7 @@ fn restart_schedule() {
 fn enter_stage() {
     let side = side_of(tally.mode);
     let spring = flows[cell.flow_index].springs[side][0];
+    let push = flows[cell.flow_index].push;
     cell.flow_index = present_flow();
     fetch_constants();
     if sticks() {
@@ -81,7 +82,7 @@ fn enter_stage() {
         }
         leave_contact(side);
     }
-    settle_force();
+    settle_force(push);
     if sticks() {
         tally.order = stuck_order(side);
     } else if tally.order > 0u {

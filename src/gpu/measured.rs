@@ -32,9 +32,9 @@ pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quan
         |i: usize| displacement(rows[i], totals, steps, totals[2 + i], 0.5 * (highs[i] - lows[i]));
     Some(Quantities {
         approaches: [Approaches::default(), Approaches::default(), both],
-        // Rounding errors do not lead beyond the ranges.
+        // A sum of what impacts and springs lose is not negative, but for rounding.
         impact_energy: (lost * energy / (steps * h)).max(0.0),
-        release_energy: pair.has_pushing_walls.then_some((released * energy / (steps * h)).max(0.0)),
+        release_energy: pair.has_pushing_walls.then_some(released * energy / (steps * h)),
         contact_force: (contact > 0.0)
             .then(|| [highs[3] * force_unit, (force / contact).max(0.0).sqrt() * force_unit]),
         displacements: std::array::from_fn(|i| if i < 3 { displacement(i) } else { Displacement::default() }),

@@ -111,9 +111,14 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     definition.parameters =
         written.into_iter().zip(shapes).map(|(written, shapes)| written.into_parameter(shapes)).collect();
     let model = FileModel::new(definition);
-    match model.oscillator() {
-        Ok(_) => Ok(model),
-        Err(error) => Err(no_motion(&root, &model.definition, &error)),
+    if let Err(error) = model.oscillator() {
+        return Err(no_motion(&root, &model.definition, &error));
+    }
+    match super::repeated_column(&model).zip(root.get("signal").or_else(|| root.get("motion"))) {
+        Some((column, field)) => Err(field.conflict(format!(
+            "two columns of a table would have the name `{column}`; rename a signal, a gap or a coordinate"
+        ))),
+        None => Ok(model),
     }
 }
 

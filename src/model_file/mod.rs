@@ -30,7 +30,7 @@ pub use friction::DryFriction;
 pub use harmonic::HarmonicForce;
 pub use signal::Signal;
 
-use crate::record::measures::Subjects;
+use crate::record::measures::{self, Subjects};
 use crate::text::error::SceneError;
 
 /// A model from a file, with values of its parameters and a start phase. Clones share everything else.
@@ -149,6 +149,29 @@ pub fn subjects(model: &dyn Model) -> Subjects {
         gaps: several_gaps(model).unwrap_or_default(),
         signals: signals.unwrap_or_default().iter().map(|signal| signal.name.clone()).collect(),
     }
+}
+
+/// Returns a name that two columns of `cells.csv` or of `trajectory.csv` would have.
+fn repeated_column(model: &FileModel) -> Option<String> {
+    let names = subjects(model);
+    let numbers = measures::all().chain(measures::of_gaps()).filter(|measure| measure.is_of(&names));
+    let parameters = model.parameters().iter().map(|parameter| parameter.name.to_string());
+    let cells = parameters.chain(names.states.clone()).chain(numbers.map(|measure| measure.name(&names)));
+    let own = |column: &str| match &names.gaps[..] {
+        [] => vec![column.to_owned()],
+        gaps => gaps.iter().map(|gap| format!("{column}_{gap}")).collect(),
+    };
+    let fixed = ["t", "phase", "event", "side", "moment", "element", "friction_force"].map(str::to_owned);
+    let several = (1..).zip(&model.definition.friction).map(|(i, _)| format!("friction_force_{i}"));
+    let gaps = gap_columns(model).concat().into_iter().chain(own("domain")).chain(own("contact_force"));
+    let place = (!names.gaps.is_empty()).then(|| "gap".to_owned());
+    let of_gaps = fixed.into_iter().chain(several).chain(gaps).chain(place);
+    let trajectory = of_gaps.chain(names.states.clone()).chain(names.signals.clone());
+    let repeated = |columns: Vec<String>| {
+        let is_repeated = |i: &usize| columns[..*i].contains(&columns[*i]);
+        (0..columns.len()).find(is_repeated).map(|i| columns[i].clone())
+    };
+    repeated(cells.collect()).or_else(|| repeated(trajectory.collect()))
 }
 
 /// Returns the names of a model's gaps, if it has several.

@@ -86,10 +86,14 @@ fn read_one(item: &Field<'_>, names: Names<'_>, count: usize) -> Result<Signal, 
         None => Ok(vec![Expression::zero(); count]),
     };
     let constant = |key: &str| section.get(key).map_or(Ok(Expression::zero()), |field| names.entry(&field));
+    let rows = [row(keys[0])?, row(keys[1])?, row(keys[2])?];
+    if rows.iter().flatten().all(|entry| entry.as_number() == Some(0.0)) {
+        return Err(name.conflict("all factors of the signal are 0; write at least one that is not"));
+    }
     Ok(Signal {
         name: name.text()?.to_owned(),
         unit: section.get("unit").map(|field| read_unit(&field)).transpose()?,
-        rows: [row(keys[0])?, row(keys[1])?, row(keys[2])?],
+        rows,
         constants: [constant("constant")?, constant("cos")?, constant("sin")?],
     })
 }

@@ -657,6 +657,8 @@ fn errors_in_signals_name_the_field() {
         r#"
 name = "seat" | | `signal.0.name` is missing
 name = "seat" | name = "a" | `signal.0.name = "a"` does not fit: `a` is already the name of a parameter, a coordinate, a velocity, a gap or a signal
+name = "seat" | name = "gap" | `signal = [[signal]]` does not fit: two columns of a table would have the name `amplitude_gap`
+name = "seat" | name = "contact_force" | `signal = [[signal]]` does not fit: two columns of a table would have the name `contact_force`
 name = "seat" | name = "rms_gap" | `signal.0.name = "rms_gap"` does not fit: `rms_gap` is a column of tables
 ["c/d", -1] | [1] | `signal.0.displacement = [1]` is out of range: it must be a row of the signal: a list of two entries
 displacement | shift | unknown field `signal.0.shift

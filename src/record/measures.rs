@@ -407,8 +407,8 @@ impl Measure {
     pub fn of(&self, record: &Record) -> Option<f64> {
         let bits = self.group.bit | if self.is_of_one_gap() { valid::GAPS } else { 0 };
         let value = (record.valid & bits == bits).then(|| record.measures[self.place]);
-        // A gap may not have the number.
-        value.filter(|value| !(self.is_of_one_gap() && value.is_nan()))
+        // A gap may not have the number, and that of a signal may be too large.
+        value.filter(|value| !value.is_nan())
     }
 
     /// Returns the number of a motion.
@@ -481,6 +481,8 @@ impl Record {
             match measure.read(motion) {
                 // The sum turns minus zero into zero, so that columns of zeros take no memory.
                 Some(value) => self.measures.set(measure.place, value + 0.0),
+                // A signal that is too large takes no other number away.
+                None if measure.signal().is_some() => self.measures.set(measure.place, f64::NAN),
                 None => self.valid &= !measure.group.bit,
             }
         }

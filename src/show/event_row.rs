@@ -3,6 +3,7 @@
 use crate::model_file::several_gaps;
 use crate::show::names;
 use rattlemap_dynamics::model::{Model, Side, State};
+use rattlemap_dynamics::motion::Slips;
 use rattlemap_dynamics::orbit::{Event, SlipPoint};
 
 /// One event.
@@ -24,8 +25,8 @@ pub(crate) enum Place {
     /// A wall: its gap and side, the side of the lasting contact after the event, and the impulse on the gap, which is negative at a
     /// right wall.
     Wall { gap: usize, side: Side, meshing: Option<Side>, impulse: Option<f64> },
-    /// An element with dry friction.
-    Element(usize),
+    /// An element with dry friction, and the modes of all elements after the event.
+    Element { element: usize, slips: Slips },
 }
 
 /// Names of the gaps and of the friction elements of a model, in columns of their own.
@@ -41,14 +42,14 @@ impl EventRow {
     pub(crate) fn side_code(&self) -> Option<i8> {
         match self.place {
             Place::Wall { side, .. } => Some(names::side_code(side)),
-            Place::Element(_) => None,
+            Place::Element { .. } => None,
         }
     }
 
     pub(crate) fn impulse(&self) -> Option<f64> {
         match self.place {
             Place::Wall { impulse, .. } => impulse,
-            Place::Element(_) => None,
+            Place::Element { .. } => None,
         }
     }
 }
@@ -69,7 +70,7 @@ impl PlaceNames {
             _ => None,
         };
         let element = match place {
-            Some(Place::Element(element)) => Some(element),
+            Some(Place::Element { element, .. }) => Some(element),
             _ => None,
         };
         let mut columns = Vec::new();
@@ -93,8 +94,8 @@ pub(crate) fn rows(model: &dyn Model, events: &[Event], slips: &[SlipPoint]) -> 
         EventRow { kind: event.kind.name(), t, t_mod_period, before, after, place }
     };
     let of_friction = |slip: &SlipPoint| {
-        let SlipPoint { kind, element, t, t_mod_period, state } = *slip;
-        let place = Place::Element(element);
+        let SlipPoint { kind, element, t, t_mod_period, state, slips } = *slip;
+        let place = Place::Element { element, slips };
         EventRow { kind: kind.name(), t, t_mod_period, before: state, after: state, place }
     };
     let mut rows: Vec<EventRow> = events.iter().map(at_wall).chain(slips.iter().map(of_friction)).collect();

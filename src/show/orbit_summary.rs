@@ -235,7 +235,7 @@ fn events(model: &dyn Model, events: &[Event], slips: &[SlipPoint], is_in_contac
     let row = |row: &EventRow| -> Vec<String> {
         let side = match row.place {
             Place::Wall { side, .. } => names::side(side),
-            Place::Element(_) => "",
+            Place::Element { .. } => "",
         };
         let place = places.columns(Some(row.place)).into_iter().map(|(_, name)| name);
         let place = place.chain([side]).filter(|text| !text.is_empty()).collect::<Vec<_>>().join(" ");

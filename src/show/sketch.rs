@@ -170,7 +170,10 @@ fn links(model: &FileModel) -> Vec<(usize, usize, Kind)> {
     };
     let number = |entry: &Expression| entry.evaluate(&changed);
     let in_stages = 0..motion.stages.len().max(1);
-    let staged = |entry: &Staged| in_stages.clone().map(|stage| number(entry.in_stage(stage))).sum();
+    // Stages have slightly different weights, so that values of opposite signs do not cancel.
+    let staged = |entry: &Staged| {
+        in_stages.clone().map(|stage| (1.0 + 0.1 * stage as f64) * number(entry.in_stage(stage))).sum()
+    };
     let of_stages = |rows: &[Vec<Staged>]| rows.iter().map(|row| row.iter().map(staged).collect()).collect();
     let mut links = Vec::new();
     for (kind, matrix) in [

@@ -79,17 +79,24 @@ pub(crate) fn with_powers(word: &str) -> String {
     if word.starts_with('#') {
         return word.to_owned();
     }
-    let (mut text, mut rest) = (String::new(), word);
+    // With several gaps, the letter of its gap belongs to a symbol.
+    let is_letter = |c: char| c.is_ascii_alphabetic();
+    let mut symbols: Vec<String> = Vec::new();
+    for c in word.chars() {
+        match symbols.last_mut().filter(|symbol| symbol.chars().all(is_letter)) {
+            Some(letter) => letter.push(c),
+            None => symbols.push(c.to_string()),
+        }
+    }
+    let (mut text, mut rest) = (String::new(), &symbols[..]);
     while !rest.is_empty() {
         let series = |length: usize| {
-            let part = &rest[..length];
-            let mut times = 1;
-            while rest[times * length..].starts_with(part) {
-                times += 1;
-            }
+            let times = 1 + rest[length..].chunks(length).take_while(|part| *part == &rest[..length]).count();
             let exponent: String = times.to_string().chars().map(superscript).collect();
-            let power = if length == 1 { format!("{part}{exponent}") } else { format!("({part}){exponent}") };
-            ((times * length).saturating_sub(power.chars().count()), times * length, power)
+            let part = rest[..length].concat();
+            let power = if part.len() == 1 { part + &exponent } else { format!("({part}){exponent}") };
+            let whole: usize = rest[..times * length].iter().map(String::len).sum();
+            (whole.saturating_sub(power.chars().count()), times * length, power)
         };
         match (1..=rest.len() / 2).map(series).max_by_key(|(saved, ..)| *saved) {
             Some((saved, length, power)) if saved >= LEAST_SAVED => {
@@ -97,7 +104,7 @@ pub(crate) fn with_powers(word: &str) -> String {
                 rest = &rest[length..];
             }
             _ => {
-                text += &rest[..1];
+                text += &rest[0];
                 rest = &rest[1..];
             }
         }

@@ -18,14 +18,15 @@ enum Tail {
     Torn,
 }
 
-/// Makes the folder `cut` from the folder `out` and the first calls of `faults/journal.c`: names that were not synced are lost, and of files
-/// the synced part is left, with this tail. Returns whether the folder itself is left.
-fn cut(calls: &[Vec<&str>], out: &Path, cut: &Path, tail: Tail) -> bool {
+/// Makes the folder `cut` from the folder `out` and the first calls of `faults/journal.c`. Of files the synced part is left, with this tail.
+/// Names that were not synced are lost, unless `early`: then they were written before the data. Returns whether the folder itself is left.
+fn cut(calls: &[Vec<&str>], out: &Path, cut: &Path, tail: Tail, early: bool) -> bool {
     let is_synced = |calls: &[Vec<&str>], folder| {
         calls.iter().any(|call| call[0] == "sync" && Path::new(call[2]) == folder)
     };
-    let names =
-        calls.iter().enumerate().filter(|(nth, call)| call[0] == "rename" && is_synced(&calls[*nth..], out));
+    let is_left =
+        |(nth, call): &(usize, &Vec<&str>)| call[0] == "rename" && (early || is_synced(&calls[*nth..], out));
+    let names = calls.iter().enumerate().filter(is_left);
     let names: HashMap<&str, &str> = names.map(|(_, call)| (call[3], call[1])).collect();
     fs::remove_dir_all(cut).ok();
     fs::create_dir(cut).unwrap();
@@ -64,18 +65,19 @@ fn what_a_command_has_written_survives_a_power_cut() {
         recorded.args(line.replace("OUT", out.to_str().unwrap()).split(' ')).assert().success();
         let text = fs::read_to_string(&journal).unwrap();
         let calls: Vec<Vec<&str>> = text.lines().map(|line| line.split('\t').collect()).collect();
-        assert!(cut(&calls, &out, &root.join("cut"), Tail::Lost), "the folder is lost");
+        assert!(cut(&calls, &out, &root.join("cut"), Tail::Lost, false), "the folder is lost");
         run(&folder, "check cut").success().stderr(says(&["all 2 files are as manifest.json says"]));
         if line.starts_with("merge") {
             continue;
         }
         let cells = fs::read(out.join("cells.csv")).unwrap();
         for count in 0..calls.len() {
-            for tail in [Tail::Lost, Tail::Zeros, Tail::Torn] {
-                cut(&calls[..count], &out, &root.join("cut"), tail);
+            let tails = [Tail::Lost, Tail::Zeros, Tail::Torn];
+            for (tail, early) in tails.into_iter().flat_map(|tail| [(tail, false), (tail, true)]) {
+                cut(&calls[..count], &out, &root.join("cut"), tail, early);
                 run(&folder, &format!("{map} cut --resume")).success();
                 let resumed = fs::read(root.join("cut/cells.csv")).unwrap();
-                assert!(resumed == cells, "after {count} calls, {tail:?}");
+                assert!(resumed == cells, "after {count} calls, {tail:?}, names early: {early}");
             }
         }
     }

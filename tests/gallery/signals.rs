@@ -156,6 +156,66 @@ fn contact_forces_of_both_engines_agree() {
     }
 }
 
+/// Returns the largest distance of the mean acceleration of two neighbouring samples from the difference quotient of the velocity, relative to
+/// the largest acceleration. Accelerations also come from forces whose modes are wrong; velocities do not.
+fn distance_from_quotients(model: &FileModel) -> f64 {
+    let (orbit, states) = (orbit(model), model.state_names());
+    let rows = Rows::of(model, &orbit);
+    let (mut apart, mut largest) = (0.0f64, 0.0f64);
+    for row in 1..rows.rows.len() {
+        let is_smooth = !(rows.text(row - 1, "moment") == "before" && rows.text(row, "moment") == "after");
+        let time = rows.number(row, "t") - rows.number(row - 1, "t");
+        for i in (0..states.len() / 2).take(MOST_SIGNALS) {
+            let name = format!("acceleration_{i}");
+            let [from, to] = [row - 1, row].map(|row| rows.number(row, &name));
+            largest = largest.max(to.abs());
+            if is_smooth && time > 1e-6 * orbit.forcing_period {
+                let change = rows.number(row, states[2 * i + 1]) - rows.number(row - 1, states[2 * i + 1]);
+                apart = apart.max((change / time - 0.5 * (from + to)).abs());
+            }
+        }
+    }
+    apart / largest
+}
+
+/// Friction along an oblique row that always sticks: its rate is never exactly 0.
+const STUCK: &str = "name = 'stuck'\nparameters = { omega = 0.8 }\nfriction = [{ row = [0.3, -0.7, 0.45], force = 50 }]\n\
+    [motion]\ncoordinates = ['x', 'y', 'z']\nmass = [[1, 0, 0], [0, 2, 0], [0, 0, 1]]\n\
+    damping = [[0.2, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]\nstiffness = [[1, -0.5, 0], [-0.5, 2, -0.2], [0, -0.2, 1]]\n\
+    force = [1, 0.3, 0]\nfrequency = 'omega'\ngap = [1, 0, 0]\n";
+
+#[test]
+fn accelerations_are_derivatives_of_velocities() {
+    let own = ["friction-oscillator", "relief-valve", "impact-oscillator", "bilinear", "two-masses"];
+    let texts = own.map(|name| FileModel::built_in(name).unwrap().definition().text.clone());
+    for text in texts.iter().map(String::as_str).chain([STUCK]) {
+        let model = with(text, &accelerations(&with(text, "").oscillator().unwrap()));
+        let apart = distance_from_quotients(&model);
+        assert!(apart < 0.02, "{}: {apart}", model.name());
+    }
+}
+
+/// Contact that begins or ends because the preload changes from stage to stage: both engines release the same energy.
+#[test]
+fn both_engines_measure_contact_that_a_stage_begins_or_ends() {
+    let text = |preload: &str| {
+        format!(
+            "name = 'staged'\nparameters = {{ omega = 0.8 }}\n[motion]\ncoordinates = ['x']\nmass = [[1]]\ndamping = [[0.1]]\n\
+             stiffness = [[1]]\nload = [0.5]\nforce = [1]\nfrequency = 'omega'\ngap = [1]\nstages = [0.05, 0.3]\n[[contact]]\n\
+             side = 'right'\nat = 0.2\nlaw = 'elastic'\nstiffness = 10\ndamping = 0.2\npreload = {preload}\npull = false\n"
+        )
+    };
+    let mut released = Vec::new();
+    for preload in ["[0.5, -30]", "[-30, 0.5]", "[0.5, -3]"] {
+        let [pair, machine] = ["", "[[signal]]\nname = 'rate'\nvelocity = [1]\n"]
+            .map(|signal| quantities(&with(&text(preload), signal)).0);
+        let [a, b] = [&pair, &machine].map(|of| of.release_energy.unwrap());
+        assert!((a - b).abs() < 1e-9 * pair.dissipated, "{preload}: {a} {b}");
+        released.push(a);
+    }
+    assert!(released.iter().any(|energy| energy.abs() > 1e-3), "{released:?}");
+}
+
 fn quantities(model: &FileModel) -> (Quantities, f64) {
     let orbit = orbit(model);
     assert!(is_periodic(&orbit), "{}", model.name());

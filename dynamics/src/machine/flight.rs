@@ -184,11 +184,7 @@ impl Frame {
         let of_gap = |gap: usize| {
             let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
             let walls = &self.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())];
-            let of_wall = |wall: &crate::model::Wall| {
-                let (spring, depth) = (wall.springs[modes.stage], y[gap] - wall.at);
-                0.5 * spring.stiffness * depth * depth + spring.preload * side.sign() * depth
-            };
-            walls.iter().map(of_wall).sum::<f64>()
+            walls.iter().map(|wall| wall.stored(modes.stage, side, y[gap])).sum::<f64>()
         };
         0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
     }

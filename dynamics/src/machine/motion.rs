@@ -339,13 +339,13 @@ impl<'s> MachineMotion<'s> {
         let before = observer.sums().is_some().then(|| energy(self));
         self.act(watch, observer);
         if let (Some(before), Some(sums)) = (before, observer.sums()) {
-            let lost = before - energy(self);
+            let after = energy(self);
             if let Watch::ForceEnds(..) | Watch::ForceBegins(..) = watch {
-                sums.released += lost;
+                sums.released.add(before, after);
             } else {
-                sums.lost += lost;
+                sums.lost.add(before, after);
                 if let Some(gap) = watch.gap() {
-                    sums.gaps[gap].lost += lost;
+                    sums.gaps[gap].lost.add(before, after);
                 }
             }
         }

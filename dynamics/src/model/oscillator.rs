@@ -142,6 +142,14 @@ pub struct Wall {
     pub springs: Vec<Spring>,
 }
 
+impl Wall {
+    /// Returns the energy that spring and preload hold in a stage, for a gap `z` behind the wall.
+    pub(crate) fn stored(&self, stage: usize, side: Side, z: f64) -> f64 {
+        let (spring, depth) = (self.springs[stage], z - self.at);
+        0.5 * spring.stiffness * depth * depth + spring.preload * side.sign() * depth
+    }
+}
+
 /// A gap and its walls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GapRow {

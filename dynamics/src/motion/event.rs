@@ -98,7 +98,7 @@ pub struct SlipEvent {
     pub element: usize,
     /// What happened.
     pub kind: SlipKind,
-    /// Modes after the event.
+    /// Modes of all elements of the model after the event.
     pub slips: Slips,
     /// Symbol `b'7'` if a phase of sticking ends, and `b'0'` if sliding reverses without sticking.
     pub symbol: Option<u8>,

@@ -30,6 +30,15 @@ impl Slip {
         }
     }
 
+    /// Returns the opposite direction of sliding.
+    pub fn reversed(self) -> Slip {
+        match self {
+            Slip::Stick => Slip::Stick,
+            Slip::Forward => Slip::Backward,
+            Slip::Backward => Slip::Forward,
+        }
+    }
+
     /// Returns the direction of a rate that is not 0.
     pub fn of(rate: f64) -> Slip {
         if rate > 0.0 { Slip::Forward } else { Slip::Backward }

@@ -80,6 +80,31 @@ impl Moments {
     }
 }
 
+/// A sum of energies, and that of the sizes to which their rounding errors are relative.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Energy {
+    sum: f64,
+    size: f64,
+}
+
+impl Energy {
+    pub(crate) const NONE: Energy = Energy { sum: 0.0, size: 0.0 };
+
+    /// Adds the difference of two energies.
+    pub(crate) fn add(&mut self, before: f64, after: f64) {
+        self.sum += before - after;
+        self.size += before.abs() + after.abs();
+    }
+
+    /// Returns the sum; 0 if it is negative by rounding.
+    pub(crate) fn sum(self) -> f64 {
+        if self.sum < 0.0 && -self.sum <= SUM_ROUNDING * self.size { 0.0 } else { self.sum }
+    }
+}
+
+/// Rounding error of a sum over a motion, relative to the sum of the sizes of its terms.
+pub(crate) const SUM_ROUNDING: f64 = 1e-12;
+
 /// Contacts of one gap so far.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GapSums {
@@ -88,7 +113,7 @@ pub(crate) struct GapSums {
     /// Time in lasting contact.
     pub(crate) contact_time: f64,
     /// Energy lost at its walls.
-    pub(crate) lost: f64,
+    pub(crate) lost: Energy,
     /// Force of its compliant contacts, and the time during which it acts.
     pub(crate) force: Moments,
     pub(crate) force_time: f64,
@@ -96,7 +121,7 @@ pub(crate) struct GapSums {
 
 impl GapSums {
     const NONE: GapSums =
-        GapSums { impacts: 0, contact_time: 0.0, lost: 0.0, force: Moments::NONE, force_time: 0.0 };
+        GapSums { impacts: 0, contact_time: 0.0, lost: Energy::NONE, force: Moments::NONE, force_time: 0.0 };
 }
 
 /// Integrals and extremes so far.
@@ -105,9 +130,9 @@ pub struct Sums {
     /// Approaches to right and left walls to which the law of restitution applies.
     pub(crate) contacts: [Contacts; 2],
     /// Energy lost in impacts and in springs of contacts that end.
-    pub(crate) lost: f64,
+    pub(crate) lost: Energy,
     /// Energy in springs and preloads of walls that only push, where their contact ends, without that where it begins.
-    pub(crate) released: f64,
+    pub(crate) released: Energy,
     /// Energy that dampers dissipate.
     pub(crate) dissipated: f64,
     /// Displacements, gaps and signals, by their places.
@@ -125,8 +150,8 @@ pub struct Sums {
 impl Sums {
     pub(crate) const NONE: Sums = Sums {
         contacts: [Contacts { count: 0, sum: 0.0, largest: 0.0 }; 2],
-        lost: 0.0,
-        released: 0.0,
+        lost: Energy::NONE,
+        released: Energy::NONE,
         dissipated: 0.0,
         displacements: [Moments::NONE; DISPLACEMENTS],
         force: Moments::NONE,

@@ -5,7 +5,7 @@
 use crate::model::{Law, MOST_GAPS, NonImpacting, State};
 use crate::motion::{
     Allowance, Contacts, DISPLACEMENTS, EventKind, Flights, Flow, GapEvent, GapSums, Moments, Observer,
-    States, Stop, Sums, Trajectory,
+    SUM_ROUNDING, States, Stop, Sums, Trajectory,
 };
 
 /// Quantities of one motion over a whole number of forcing periods, in the units of the model.
@@ -16,7 +16,8 @@ pub struct Quantities {
     /// Energy lost in contacts per unit time: `(1 - e^2) w^2 / (2 g M^-1 g)` in each impact, and the energy of a contact
     /// spring that is released before it relaxes.
     pub impact_energy: f64,
-    /// Energy that walls that only push still hold when their contact ends, per unit time; none without such walls.
+    /// Energy that walls that only push hold when their contact ends, without what they hold when it begins, per unit time. Negative with a
+    /// damper and a preload that pulls. None without such walls.
     pub release_energy: Option<f64>,
     /// Largest and root mean square force of compliant contacts, positive if it presses; none without such contact.
     pub contact_force: Option<[f64; 2]>,
@@ -174,21 +175,24 @@ impl<'f> Meter<'f> {
         let of_gap = |gap: GapSums| GapQuantities {
             impacts_per_period: gap.impacts as f64 / (period - self.first_period) as f64,
             mesh_fraction: gap.contact_time / time,
-            impact_energy: (gap.lost / time).max(0.0),
+            impact_energy: gap.lost.sum() / time,
             contact_force: (gap.force_time > 0.0)
                 .then(|| [gap.force.high, (gap.force.square / gap.force_time).sqrt()]),
         };
         Quantities {
             approaches: [right, left, right.and(left)].map(Approaches::of),
-            // Rounding errors do not lead beyond the ranges.
-            impact_energy: (sums.lost / time).max(0.0),
-            release_energy: self.flow.has_pushing_walls().then_some((sums.released / time).max(0.0)),
+            impact_energy: sums.lost.sum() / time,
+            release_energy: self.flow.has_pushing_walls().then_some(sums.released.sum() / time),
             contact_force: (sums.contact_time > 0.0)
                 .then(|| [sums.force.high, (sums.force.square / sums.contact_time).sqrt()]),
             displacements: sums.displacements.map(|moments| Displacement::of(&moments, time)),
             dissipated: sums.dissipated / time,
             friction: self.flow.has_friction().then(|| FrictionQuantities {
-                sticking: (sums.sticking_time / time).min(1.0),
+                // Rounding errors do not lead beyond the whole time.
+                sticking: match sums.sticking_time / time {
+                    share if (1.0..=1.0 + SUM_ROUNDING).contains(&share) => 1.0,
+                    share => share,
+                },
                 dissipated: sums.heat / time,
             }),
             gaps: (self.flow.gap_count() > 1).then(|| sums.gaps.map(of_gap)),

@@ -150,8 +150,8 @@ impl Observer for EventLog<'_> {
     }
 
     fn slip(&mut self, event: &SlipEvent) {
-        let SlipEvent { element, kind, at, .. } = *event;
+        let SlipEvent { element, kind, at, slips, .. } = *event;
         let [t, t_mod_period] = self.times(event.period, event.t);
-        self.slips.push(SlipPoint { kind, element, t, t_mod_period, state: at });
+        self.slips.push(SlipPoint { kind, element, t, t_mod_period, state: at, slips });
     }
 }

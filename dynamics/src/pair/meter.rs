@@ -157,9 +157,20 @@ impl<'f> PairMeter<'f> {
         self.flow.contact_force(self.kind).map(|force| side.sign() * force.at(q))
     }
 
+    /// Returns the flow after an event, which a change of the stage may have caused.
+    fn flow_after(&self, event: &GapEvent) -> &'f PairFlow {
+        let mut schedule = self.schedule;
+        let stage = match schedule.next_change() {
+            Some(change) if change == event.t => schedule.change(),
+            None if event.t == self.flow.period => schedule.restart(),
+            _ => self.stage,
+        };
+        stage.interval(self.interval)
+    }
+
     /// Returns the energy of a wall's spring and preload at an event.
-    fn stored(&self, event: &GapEvent) -> f64 {
-        let (side, flow) = (event.side, self.flow);
+    fn stored(&self, event: &GapEvent, flow: &PairFlow) -> f64 {
+        let side = event.side;
         let depth = event.before[0] - flow.wall(side);
         let of_spring = 0.5 * flow.wall_force(side)[0] * depth * depth;
         match flow.oscillator.preload(side) {
@@ -173,20 +184,23 @@ impl<'f> PairMeter<'f> {
         let (side, flow) = (event.side, self.flow);
         let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
         if flow.oscillator.contacts[side.index()] == Contact::Pushing {
-            let sign = if event.kind == EventKind::MeshEnd { 1.0 } else { -1.0 };
-            sums.released += sign * self.stored(event);
+            let [before, after] = match event.kind {
+                EventKind::MeshEnd => [self.stored(event, self.flow), 0.0],
+                _ => [0.0, self.stored(event, self.flow_after(event))],
+            };
+            sums.released.add(before, after);
         } else if event.kind == EventKind::MeshEnd {
-            sums.lost += self.stored(event);
+            sums.lost.add(self.stored(event, flow), 0.0);
         } else if flow.contacts[side.index()].is_elastic() {
-            sums.lost -= self.stored(event);
+            sums.lost.add(0.0, self.stored(event, flow));
         } else {
             if event.ends_series {
                 // The series of impacts dissipates the energy with which the gap left the wall.
-                sums.lost += kinetic(self.q[1]);
+                sums.lost.add(kinetic(self.q[1]), 0.0);
                 return;
             }
             let approach = side.sign() * event.before[1];
-            sums.lost += kinetic(approach) - kinetic(event.after[1]);
+            sums.lost.add(kinetic(approach), kinetic(event.after[1]));
             sums.approach(side, approach);
         }
     }

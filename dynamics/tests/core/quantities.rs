@@ -145,14 +145,17 @@ fn compliant_and_rigid_contacts_close_the_balance() {
     let pushing = Pair { contacts: [Contact::Pushing; 2], ..elastic.clone() };
     let loose = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -0.2) };
     let tight = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, 0.1) };
+    let pulled = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -2.0) };
     let table = Linear { gamma: 0.0, square: 0.0, force: 1.2, load: 1.0, omega: 1.0 };
     let rigid = with_wall(table.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0, 0.0]);
+    let mut released = Vec::new();
     for (oscillator, law, start) in [
         (elastic.clone(), Law::both(0.5, 0.0), REST),
         (with_preload(elastic, Side::Right, 0.1), Law::both(0.5, 0.0), REST),
         (pushing, Law::both(0.5, 0.0), REST),
         (loose, Law::both(0.5, 0.0), REST),
         (tight, Law::both(0.5, 0.0), REST),
+        (pulled, Law::both(0.5, 0.0), REST),
         (rigid.clone(), Law::both(0.0, 0.0), REST),
         (rigid, Law::both(0.4, 0.0), REST),
     ] {
@@ -163,6 +166,7 @@ fn compliant_and_rigid_contacts_close_the_balance() {
         let work = power(oscillator.force[0], oscillator.omega, of.displacements[0].harmonic);
         let lost = of.dissipated + of.impact_energy + of.release_energy.unwrap_or(0.0);
         assert!(near(work, lost, 1e-10 * work.abs()), "{work} {of:?}");
+        released.extend(of.release_energy);
         let (is_elastic, wall) = (oscillator.contacts[0].is_elastic(), &oscillator.meshing[0]);
         assert_eq!(of.contact_force.is_some(), is_elastic, "{of:?}");
         if let Some([largest, rms]) = of.contact_force {
@@ -188,4 +192,8 @@ fn compliant_and_rigid_contacts_close_the_balance() {
             );
         }
     }
+    assert!(
+        released.iter().any(|energy| *energy < 0.0) && released.iter().any(|energy| *energy > 0.0),
+        "{released:?}"
+    );
 }

@@ -218,7 +218,15 @@ fn read_contours(field: &Field<'_>, factor: Option<f64>) -> Result<Vec<f64>, Sce
         number if place(factor, number).is_finite() => Ok(number),
         _ => Err(item.out_of_range("finite, and above 0 on a scale that is not linear")),
     };
-    items.iter().map(number).collect()
+    let mut numbers: Vec<f64> = Vec::new();
+    for item in &items {
+        let number = number(item)?;
+        if numbers.contains(&number) {
+            return Err(item.conflict("it stands in the list twice; remove one"));
+        }
+        numbers.push(number);
+    }
+    Ok(numbers)
 }
 
 /// Reads the scale of a layer and the ends of its numbers.

@@ -10,11 +10,9 @@ use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
 use crate::show::names::optional;
 use crate::show::orbit_spectrum::Spectrum;
 use rattlemap_dynamics::machine::{Outputs, Situation, System};
-use rattlemap_dynamics::model::{
-    DryFriction, MOST_FRICTION, Model, ModelError, Oscillator, REST, Side, State,
-};
+use rattlemap_dynamics::model::{DryFriction, Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::motion::{Slip, SlipKind, Slips};
-use rattlemap_dynamics::orbit::{Event, History, SlipPoint, is_reached};
+use rattlemap_dynamics::orbit::{Event, History, Sample, SlipPoint, is_reached};
 
 /// A row of the motion: a sample, or the state before or after an event.
 #[derive(Clone, Debug)]
@@ -50,11 +48,10 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
         contacts[0] = history.meshing;
     }
     let system = System::new(&oscillator);
-    let mut sliding =
-        Sliding::at_start(&oscillator, samples.first().map_or(&REST, |first| &first.state), slips);
-    let mut add = |t, phase, state: &State, (contacts, sliding): (&[Option<Side>], &Sliding), event| {
+    let mut modes = modes_at_start(&oscillator, samples, slips);
+    let mut add = |t, phase, state: &State, (contacts, slips): (&[Option<Side>], Slips), event| {
         let gap = |gap| [0, 1].map(|velocity| oscillator.gap_value(gap, state, velocity));
-        let (time, slips) = (phase * forcing_period, sliding.modes(&oscillator, state));
+        let time = phase * forcing_period;
         let is_after = !matches!(event, Some((_, "before")));
         let outputs = system.outputs(state, &Situation { time, contacts, slips, is_after });
         moments.push(Moment {
@@ -63,10 +60,9 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
             gaps: (0..gaps.len()).map(gap).collect(),
             state: *state,
             domains: contacts[..gaps.len()].iter().copied().map(domain_name).collect(),
-            outputs: outputs.clone(),
+            outputs,
             event,
         });
-        outputs
     };
     let mut events = event_row::rows(model, events, slips).into_iter().peekable();
     let mut last = f64::NEG_INFINITY;
@@ -74,14 +70,19 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
         while let Some(event) = events.next_if(|event| is_reached(event.t, sample.t)) {
             let phase = event.t_mod_period / forcing_period;
             last = event.t;
-            let before =
-                add(last, phase, &event.before, (&contacts, &sliding), Some((event.clone(), "before")));
+            add(last, phase, &event.before, (&contacts, modes), Some((event.clone(), "before")));
             match event.place {
-                Place::Wall { gap, meshing, .. } => contacts[gap] = meshing,
-                Place::Element(i) => sliding.change(i, event.kind, before.friction[i]),
+                Place::Wall { gap, meshing, .. } => {
+                    contacts[gap] = meshing;
+                    // An impact can reverse the direction of sliding.
+                    for (mode, element) in modes.iter_mut().zip(&oscillator.friction) {
+                        *mode = rate(element, &event.after).map_or(*mode, Slip::of);
+                    }
+                }
+                Place::Element { slips, .. } => modes = slips,
             }
             let after = event.after;
-            add(last, phase, &after, (&contacts, &sliding), Some((event, "after")));
+            add(last, phase, &after, (&contacts, modes), Some((event, "after")));
         }
         if sample.t > last {
             let phase = (i % samples_per_period) as f64 / *samples_per_period as f64;
@@ -89,54 +90,40 @@ pub fn moments(model: &dyn Model, history: &History) -> Result<Vec<Moment>, Mode
             if i > 0 || starts_in_contact {
                 contacts[0] = sample.meshing;
             }
-            add(sample.t, phase, &sample.state, (&contacts, &sliding), None);
+            add(sample.t, phase, &sample.state, (&contacts, modes), None);
         }
     }
     Ok(moments)
 }
 
-/// Modes of dry friction.
-struct Sliding {
-    sticks: [bool; MOST_FRICTION],
-    /// The direction of an element that slides at a rate of 0.
-    directions: [f64; MOST_FRICTION],
+/// Returns the modes of dry friction at the start of a motion. The first event of an element tells whether it sticks, and its first rate that
+/// is not a rounding error tells the direction.
+fn modes_at_start(oscillator: &Oscillator, samples: &[Sample], slips: &[SlipPoint]) -> Slips {
+    let mode = |i: usize| {
+        let Some(element) = oscillator.friction.get(i) else { return Slip::Stick };
+        let first = slips.iter().find(|slip| slip.element == i);
+        let before_first = samples.iter().take_while(|sample| first.is_none_or(|first| sample.t < first.t));
+        let rate = before_first.filter_map(|sample| rate(element, &sample.state)).next();
+        match (first.map(|first| (first.kind, first.slips[i])), rate) {
+            (Some((SlipKind::Slip, _)), _) | (None, None) => Slip::Stick,
+            (Some((SlipKind::Reversal, after)), _) => after.reversed(),
+            (_, Some(rate)) => Slip::of(rate),
+            (Some(_), None) => Slip::Stick,
+        }
+    };
+    std::array::from_fn(mode)
 }
 
-impl Sliding {
-    /// Returns the modes at the start of a motion. The first event of an element tells them, or else its rate.
-    fn at_start(oscillator: &Oscillator, start: &State, slips: &[SlipPoint]) -> Sliding {
-        let sticks = std::array::from_fn(|i| match slips.iter().find(|slip| slip.element == i) {
-            Some(first) => first.kind == SlipKind::Slip,
-            None => oscillator.friction.get(i).is_none_or(|element| rate(element, start) == 0.0),
-        });
-        Sliding { sticks, directions: [0.0; MOST_FRICTION] }
-    }
-
-    /// Enters the mode after an event, before which friction had a force.
-    fn change(&mut self, element: usize, kind: &str, force: f64) {
-        let is = |own: SlipKind| kind == own.name();
-        self.sticks[element] = is(SlipKind::Stick);
-        // The element breaks away in the direction of the force that held it.
-        self.directions[element] = if is(SlipKind::Reversal) { -force } else { force };
-    }
-
-    fn modes(&self, oscillator: &Oscillator, state: &State) -> Slips {
-        let mode = |i: usize| match oscillator.friction.get(i) {
-            Some(element) if !self.sticks[i] => {
-                let rate = rate(element, state);
-                Slip::of(if rate == 0.0 { self.directions[i] } else { rate })
-            }
-            _ => Slip::Stick,
-        };
-        std::array::from_fn(mode)
-    }
-}
-
-/// Returns the sliding rate of an element with dry friction.
-fn rate(element: &DryFriction, state: &State) -> f64 {
+/// Returns the sliding rate of an element with dry friction, unless it is a rounding error.
+fn rate(element: &DryFriction, state: &State) -> Option<f64> {
     let terms = element.row.iter().zip(state.iter().skip(1).step_by(2)).map(|(row, velocity)| row * velocity);
-    terms.sum::<f64>() - element.speed
+    let add = |[sum, size]: [f64; 2], term: f64| [sum + term, size + term.abs()];
+    let [rate, size] = terms.fold([-element.speed, element.speed.abs()], add);
+    (rate.abs() > RATE_ROUNDING * size).then_some(rate)
 }
+
+/// Rounding error of a sliding rate, relative to the sum of the moduli of its terms.
+const RATE_ROUNDING: f64 = 1e-9;
 
 /// Writes `events.csv`, one row per event, with the fields of the events in `orbit --json`. The last columns are the name of the gap, if
 /// there are several, and that of the friction element, if the model has friction. An event of friction has no side.

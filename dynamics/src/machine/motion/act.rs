@@ -7,7 +7,7 @@ use crate::machine::modes::{AtRest, GapMode, signed};
 use crate::machine::watch::Watch;
 use crate::model::{Side, Wall};
 use crate::motion::{
-    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, SlipEvent, SlipKind,
+    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, SlipEvent, SlipKind, Slips,
 };
 use crate::word;
 
@@ -257,10 +257,13 @@ impl MachineMotion<'_> {
             SlipKind::Slip => Some(b'7'),
             SlipKind::Reversal => Some(b'0'),
         };
+        let mut slips = Slips::default();
+        let elements = &self.system.elements;
+        elements.iter().zip(self.modes.slips).for_each(|(element, slip)| slips[element.index] = slip);
         observer.slip(&SlipEvent {
-            element: self.system.elements[element].index,
+            element: elements[element].index,
             kind,
-            slips: self.modes.slips,
+            slips,
             symbol,
             period: self.period,
             t: self.clock.time(),

@@ -2,10 +2,11 @@
 
 use super::MachineMotion;
 use super::act::RELEASE_ORDER;
+use crate::machine::domain::DomainKey;
 use crate::machine::modes::{AtRest, GapMode, Modes};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
-use crate::motion::{EventKind, Observer, SlipKind};
+use crate::motion::{EventKind, Observer, SlipKind, Sums};
 
 /// Largest number of decisions on elements at rest after one event.
 const MOST_DECISIONS: usize = 16;
@@ -223,13 +224,40 @@ impl MachineMotion<'_> {
 
     /// Enters a stage and decides the modes that depend on forces again.
     pub(super) fn enter_stage(&mut self, stage: usize, observer: &mut dyn Observer) {
+        let before = self.modes.key(self.system);
         self.modes.stage = stage;
         self.before = self.point;
         self.refresh();
         self.settle(&AtRest::default(), observer);
+        if let Some(sums) = observer.sums() {
+            self.measure_change(&before, sums);
+        }
         for gap in 0..self.system.gaps() {
             if let (Some((side, _)), true) = (self.roots.at_wall[gap], self.rate(gap) == 0.0) {
                 self.leave(gap, side);
+            }
+        }
+    }
+
+    /// Measures the energy of contacts that a change of the stage has ended or begun.
+    fn measure_change(&self, before: &DomainKey, sums: &mut Sums) {
+        let (system, after) = (self.system, self.modes.key(self.system));
+        for gap in 0..system.gaps() {
+            let [from, to] = [before.engaged[gap], after.engaged[gap]];
+            if from == to {
+                continue;
+            }
+            // Only contact with the outermost wall depends on its force.
+            let side = if from + to > 0 { Side::Right } else { Side::Left };
+            let wall = system.last_wall(gap, side);
+            let stored = |stage: usize| wall.stored(stage, side, self.point[gap]);
+            let [held, holds] =
+                if from.abs() > to.abs() { [stored(before.stage), 0.0] } else { [0.0, stored(after.stage)] };
+            if wall.contact == Contact::Pushing {
+                sums.released.add(held, holds);
+            } else {
+                sums.lost.add(held, holds);
+                sums.gaps[gap].lost.add(held, holds);
             }
         }
     }
