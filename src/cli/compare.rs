@@ -116,7 +116,10 @@ fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
     };
     let exponents = comparison.exponent.map(|largest| {
         let place = scene.points().named(largest.id);
-        format!("exponents of {} by {:.1e} at most, at {place}", comparison.exponents, largest.difference)
+        format!(
+            "exponents of {} differ by at most {:.1e}, at {place}",
+            comparison.exponents, largest.difference
+        )
     });
     let parts = [
         tally("in symmetry", comparison.symmetric),
@@ -127,7 +130,7 @@ fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     let cycles = (!parts.is_empty())
-        .then(|| format!("differences between cycles of equal period: {}", parts.join(", ")));
+        .then(|| format!("cells with the same period in both maps differ: {}", parts.join(", ")));
     let attractors = tally("cells differ in the number of attractors", comparison.attractors);
     // Each map numbers its attractors by its own shares, so numbers of two maps cannot be compared.
     let basins = scene.is_basin().then(|| {

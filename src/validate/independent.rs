@@ -31,9 +31,9 @@ const RECURS: f64 = 1e-7;
 /// Relative distance below which two strobe states may converge to each other.
 const NEARLY_RECURS: f64 = 1e-4;
 
-/// Distance from phase 0, in turns, within which rounding may put an event before or after the strobe. If there is such an event, states at
-/// another phase are compared.
-const ON_STROBE: f64 = 1e-7;
+/// Distance from phase 0, in turns, within which rounding, or the displacement of a neighbouring motion, may put an event before or after the
+/// strobe. If there is such an event, states at another phase are compared.
+const ON_STROBE: f64 = 1e-4;
 
 /// Relative displacement of a neighbouring motion.
 const DISPLACEMENT: f64 = 1e-7;

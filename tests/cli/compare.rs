@@ -72,7 +72,7 @@ fn differing_cells_are_those_of_the_tables() {
         "start: up in A, down in B",
         &format!("{} of 144 cells differ (", differing.len()),
         &format!("): {} by class, {} by period", kinds[0], kinds[1]),
-        "differences between cycles of equal period: ",
+        "cells with the same period in both maps differ: ",
         " in symmetry, ",
         " by word, ",
         " by pattern, ",

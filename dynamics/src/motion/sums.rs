@@ -103,7 +103,15 @@ impl Energy {
 }
 
 /// Rounding error of a sum over a motion, relative to the sum of the sizes of its terms.
-pub(crate) const SUM_ROUNDING: f64 = 1e-12;
+const SUM_ROUNDING: f64 = 1e-12;
+
+/// Returns the share of a time. Rounding errors do not lead beyond the whole.
+pub(crate) fn share(part: f64, whole: f64) -> f64 {
+    match part / whole {
+        share if (1.0..=1.0 + SUM_ROUNDING).contains(&share) => 1.0,
+        share => share,
+    }
+}
 
 /// Contacts of one gap so far.
 #[derive(Clone, Copy, Debug)]

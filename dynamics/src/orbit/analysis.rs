@@ -12,7 +12,7 @@ use super::resolution::{is_below_resolution, too_few_events};
 use super::{Class, Orbit, Section, Settings, Status};
 use crate::model::{Law, Model, ModelError, NonImpacting, State};
 use crate::motion::Flow;
-use crate::motion::{Allowance, Stop, Trajectory};
+use crate::motion::{Allowance, Stop, Trajectory, share};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap, norm};
 use crate::word::Word;
 
@@ -371,7 +371,7 @@ impl Analysis<'_> {
             lyapunov_error,
             impacts_per_period: (carrier.work().impacts - before.impacts) as f64 / span,
             events: carrier.work().events - before.events,
-            mesh_fraction: (carrier.meshing_time() - mesh_start) / (span * self.flow.period),
+            mesh_fraction: share(carrier.meshing_time() - mesh_start, span * self.flow.period),
         })
     }
 

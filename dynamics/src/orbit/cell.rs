@@ -21,7 +21,7 @@ use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch}
 use super::{Budget, Orbit, Section, Status};
 use crate::model::{Law, State};
 use crate::motion::Flow;
-use crate::motion::{Allowance, Stop, Trajectory};
+use crate::motion::{Allowance, Stop, Trajectory, share};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
 use crate::word::Word;
 
@@ -572,7 +572,7 @@ impl<'a> CellRun<'a> {
             is_quasi_periodic,
             lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
             impacts_per_period: impacts / span,
-            mesh_fraction: meshing_time / (span * period),
+            mesh_fraction: share(meshing_time, span * period),
             ..self.without_results(if is_quasi_periodic { Status::Ok } else { status })
         }
     }

@@ -5,7 +5,7 @@
 use crate::model::{Law, MOST_GAPS, NonImpacting, State};
 use crate::motion::{
     Allowance, Contacts, DISPLACEMENTS, EventKind, Flights, Flow, GapEvent, GapSums, Moments, Observer,
-    SUM_ROUNDING, States, Stop, Sums, Trajectory,
+    States, Stop, Sums, Trajectory, share,
 };
 
 /// Quantities of one motion over a whole number of forcing periods, in the units of the model.
@@ -174,7 +174,7 @@ impl<'f> Meter<'f> {
         let [right, left] = sums.contacts;
         let of_gap = |gap: GapSums| GapQuantities {
             impacts_per_period: gap.impacts as f64 / (period - self.first_period) as f64,
-            mesh_fraction: gap.contact_time / time,
+            mesh_fraction: share(gap.contact_time, time),
             impact_energy: gap.lost.sum() / time,
             contact_force: (gap.force_time > 0.0)
                 .then(|| [gap.force.high, (gap.force.square / gap.force_time).sqrt()]),
@@ -188,11 +188,7 @@ impl<'f> Meter<'f> {
             displacements: sums.displacements.map(|moments| Displacement::of(&moments, time)),
             dissipated: sums.dissipated / time,
             friction: self.flow.has_friction().then(|| FrictionQuantities {
-                // Rounding errors do not lead beyond the whole time.
-                sticking: match sums.sticking_time / time {
-                    share if (1.0..=1.0 + SUM_ROUNDING).contains(&share) => 1.0,
-                    share => share,
-                },
+                sticking: share(sums.sticking_time, time),
                 dissipated: sums.heat / time,
             }),
             gaps: (self.flow.gap_count() > 1).then(|| sums.gaps.map(of_gap)),

@@ -4,7 +4,7 @@ use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
 use super::{Event, SlipPoint};
 use crate::model::{Side, State};
-use crate::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Stop, Sums, Trajectory};
+use crate::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Stop, Sums, Trajectory, share};
 use crate::word::Word;
 
 /// Largest distance from phase 0, in turns, of an event that lies on the strobe.
@@ -64,7 +64,7 @@ impl Reading {
             strobe_meshing,
             word: Word::cyclic(&symbols),
             impacts_per_period: (trajectory.work().impacts - impacts_start) as f64 / span,
-            mesh_fraction: (trajectory.meshing_time() - mesh_start) / (span * flow.period),
+            mesh_fraction: share(trajectory.meshing_time() - mesh_start, span * flow.period),
             quantities: meter.map(|meter| meter.finish(trajectory.period())),
             itineraries: recorders.into_iter().map(|recorder| recorder.itinerary).collect(),
             closes: trajectory.is_in_domain_of(&first),

@@ -31,7 +31,7 @@ const fn entry(color: Color, text: &'static str, kind: Option<Kind>) -> CellColo
 /// All colours. Those of differences are from Okabe and Ito's colour-blind safe set.
 const COLORS: [CellColor; 10] = [
     entry([0xdc, 0xe9, 0xf4], "both periodic", None),
-    entry([0xf6, 0xd9, 0x8b], "both periodic, other", None),
+    entry([0xf6, 0xd9, 0x8b], "same period, other", None),
     entry([0xbc, 0xbc, 0xbc], "both chaotic", None),
     entry([0xd9, 0xb0, 0xf8], "both undecided or failed", None),
     entry([0xd5, 0x5e, 0x00], "A periodic, B chaotic", Some(Kind::Class)),

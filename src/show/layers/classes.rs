@@ -133,7 +133,7 @@ fn entries(
     let has_several_kinds = counts[0] + counts[2] + counts[3] + counts[4] > 0;
     let with_contact = match (has_several_kinds, shows_symmetry) {
         (true, true) => "period 1, symmetric",
-        (true, false) => "period 1, contact",
+        (true, false) => "period 1, intermittent contact",
         (false, _) => "period 1",
     };
     let of_gap = |all: &str, state: &str| match gap {

@@ -31,16 +31,12 @@ pub(crate) const NOT_KNOWN: Color = [0xc4, 0xc4, 0xc4];
 struct Texts {
     name: &'static str,
     title: &'static str,
-    plural: &'static str,
 }
 
-const WORDS: Texts = Texts { name: "word", title: "word: cyclic sequence of flights", plural: "words" };
+const WORDS: Texts = Texts { name: "word", title: "word: cyclic sequence of flights" };
 
-const PATTERNS: Texts = Texts {
-    name: "pattern",
-    title: "pattern: the word with each run of one flight counted once",
-    plural: "patterns",
-};
+const PATTERNS: Texts =
+    Texts { name: "pattern", title: "pattern: the word with each run of one flight counted once" };
 
 /// Returns the layer of words.
 pub(crate) fn words(words: &WordIndex) -> Layer {
@@ -94,11 +90,11 @@ fn entries(
     };
     let mut list: Vec<NamedColor> = spellings.iter().enumerate().take(LISTED_WORDS).map(entry).collect();
     let ends = [LISTED_WORDS, COLORED_WORDS, usize::MAX].map(|end| end.min(words.list.len()));
-    let other = [("other", ", a colour each"), ("rare", ", one colour")];
+    let other = [("more", ", a colour each"), ("rare", ", one colour")];
     for ((kind, colors), ends) in other.into_iter().zip(ends.windows(2)).filter(|(_, ends)| ends[0] < ends[1])
     {
         let some = &words.list[ends[0]..ends[1]];
-        let text = format!("{} {kind} {}{colors}", some.len(), texts.plural);
+        let text = format!("{} {kind}{colors}", some.len());
         let cells = some.iter().map(|(_, cells)| cells).sum();
         list.push(NamedColor { color: color(ends[0]), text, cells });
     }

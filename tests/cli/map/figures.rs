@@ -96,7 +96,10 @@ fn a_legend_does_not_mention_symmetry_that_was_not_requested() {
     succeeds(&folder, "map one.toml --engine cpu --out o --quiet");
     let figure = fs::read_to_string(folder.path().join("o/map.svg")).unwrap();
     let has = |text: &str| figure.contains(text);
-    assert!(has("period 1, no contact") && has("period 1, contact") && !has("symmetric"), "{figure}");
+    assert!(
+        has("period 1, no contact") && has("period 1, intermittent contact") && !has("symmetric"),
+        "{figure}"
+    );
 }
 
 /// A shaft drives a loose gear. The flanks stay in contact while the drag exceeds the inertia, up to swing = 8.106. The driving
@@ -120,7 +123,7 @@ fn a_legend_names_motion_that_never_leaves_contact() {
         let [figure, report] = ["map.svg", "report.html"]
             .map(|file| fs::read_to_string(folder.path().join(name).join(file)).unwrap());
         let has = |text: &str| figure.contains(text);
-        assert!(has("period 1, always in contact") && has("period 1, contact"), "{figure}");
+        assert!(has("period 1, always in contact") && has("period 1, intermittent contact"), "{figure}");
         let entry = format!(r#""color":"ebaac8","text":"period 1, always in contact","share":"{share}""#);
         assert!(report.contains(&entry), "{entry}");
     }
