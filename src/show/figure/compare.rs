@@ -72,7 +72,10 @@ pub fn draw(style: &FigureStyle, pair: &MapPair<'_>) -> Canvas {
     let title = format!("Where two maps differ: A is {}, B is {}", a.name, b.name);
     let others = Kind::ALL.into_iter().filter(|kind| !kind.is_decisive() && pair.comparison.count(*kind) > 0);
     let others: Vec<&str> = others.map(Kind::name).collect();
-    let other = format!("{} {}", COLORS[OTHER].text, others.join(" or "));
+    let other = match &others[..] {
+        [one] => format!("{} {one}", COLORS[OTHER].text),
+        _ => "same period, otherwise different".to_owned(),
+    };
     let (subtitle, rows) = (subtitle(pair), rows(&indices, &other));
     let figure =
         MapFigure { cells: a.cells, title: &title, subtitle: &subtitle, rows, bar: None, legend: LEGEND };
