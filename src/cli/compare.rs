@@ -117,7 +117,7 @@ fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
     let exponents = comparison.exponent.map(|largest| {
         let place = scene.points().named(largest.id);
         format!(
-            "exponents of {} differ by at most {:.1e}, at {place}",
+            "exponents of {} by at most {:.1e}, at {place}",
             comparison.exponents, largest.difference
         )
     });

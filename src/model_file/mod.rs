@@ -151,12 +151,11 @@ pub fn subjects(model: &dyn Model) -> Subjects {
     }
 }
 
-/// Returns a name that two columns of `cells.csv` or of `trajectory.csv` would have.
+/// Returns a name that two columns of `cells.csv` or of `trajectory.csv` would have. A scene checks the parameters that it sweeps.
 fn repeated_column(model: &FileModel) -> Option<String> {
     let names = subjects(model);
     let numbers = measures::all().chain(measures::of_gaps()).filter(|measure| measure.is_of(&names));
-    let parameters = model.parameters().iter().map(|parameter| parameter.name.to_string());
-    let cells = parameters.chain(names.states.clone()).chain(numbers.map(|measure| measure.name(&names)));
+    let cells = names.states.iter().cloned().chain(numbers.map(|measure| measure.name(&names)));
     let own = |column: &str| match &names.gaps[..] {
         [] => vec![column.to_owned()],
         gaps => gaps.iter().map(|gap| format!("{column}_{gap}")).collect(),

@@ -31,9 +31,12 @@ const RECURS: f64 = 1e-7;
 /// Relative distance below which two strobe states may converge to each other.
 const NEARLY_RECURS: f64 = 1e-4;
 
-/// Distance from phase 0, in turns, within which rounding, or the displacement of a neighbouring motion, may put an event before or after the
-/// strobe. If there is such an event, states at another phase are compared.
-const ON_STROBE: f64 = 1e-4;
+/// Distance from phase 0, in turns, within which rounding may put an event before or after the strobe.
+const ON_STROBE: f64 = 1e-7;
+
+/// Distance from phase 0, in turns, within which the displacement of a neighbouring motion may put an event on the other side of the strobe.
+/// If there is such an event, states at another phase are compared.
+const NEAR_STROBE: f64 = 1e-4;
 
 /// Relative displacement of a neighbouring motion.
 const DISPLACEMENT: f64 = 1e-7;
@@ -102,7 +105,7 @@ impl Strobed<'_> {
     /// moved before or if no event lies at phase 0.
     fn leave_strobe(&mut self) -> Option<bool> {
         let mut phases = std::mem::take(&mut self.flight.tally.phases);
-        if self.from > 0.0 || !phases.iter().any(|phase| (phase - phase.round()).abs() < ON_STROBE) {
+        if self.from > 0.0 || !phases.iter().any(|phase| (phase - phase.round()).abs() < NEAR_STROBE) {
             return Some(false);
         }
         phases.extend([0.0, 1.0]);

@@ -102,6 +102,8 @@ fn a_page_works_with_wheel_and_tab_keys_on_paper_and_on_a_phone() {
     page.until("view.width < 0.6 * columns");
     assert_eq!(page.value(place), before, "the place under the pointer moved");
     assert_eq!(page.value("scrollY"), 0);
+    // New records change the shares in the legend.
+    page.until("live?.isWhole && live.columns >= 65 && covers(live.made, view)");
     // Every control once, in the order of the document and with a mark of the focus.
     let controls = "[...document.querySelectorAll('[tabindex=\"0\"], input, summary, button:not([tabindex=\"-1\"]):enabled')].filter((each) => \
                     each.checkVisibility()).map(({ id, textContent: text }) => id || text)";

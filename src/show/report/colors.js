@@ -122,6 +122,7 @@ function showLayer(index) {
 /** @type {(layer: Layer) => void} */
 function showLegend(current) {
   byId("legend-title").textContent = current.title;
+  const focused = document.activeElement?.closest("#legend button")?.children[1].textContent;
   byId("legend").replaceChildren(...current.entries.map(({ color, text, share }) => {
     const patch = element("span", undefined, "patch");
     patch.style.background = `#${color}`;
@@ -145,6 +146,8 @@ function showLegend(current) {
     item.append(button);
     return item;
   }));
+  // New records make the list anew. The focus stays on its row.
+  if (focused) [...byId("legend").querySelectorAll("button")].find(({ children }) => children[1].textContent === focused)?.focus();
   if (["word", "pattern"].includes(current.name) && map.letters) byId("legend").append(element("li", map.letters, "beyond"));
 }
 
