@@ -35,19 +35,15 @@ pub fn attractors(plan: &Plan, records: &(impl Records + ?Sized)) -> Option<Vec<
     let count = |id: usize| {
         let runs = (id..records.count()).step_by(cells);
         let cell = plan.cell(id as u32);
-        let mut found =
-            CellAttractors { law: plan.law(cell.law), chaos: false, torus: false, cycles: Vec::new() };
-        flows.with(cell.flow, |flow| runs.for_each(|run| found.take(flow, &records.record(run))));
-        found.count()
+        let runs = runs.map(|run| records.record(run));
+        flows.with(cell.flow, |flow| CellAttractors::count(flow, plan.law(cell.law), runs))
     };
     Some((0..cells).into_par_iter().map(count).collect())
 }
 
 /// Whether two periodic motions of a cell are one attractor.
-pub(crate) fn is_one(flow: &Flow, law: Law, motions: [&Record; 2]) -> bool {
-    let mut found = CellAttractors { law, chaos: false, torus: false, cycles: Vec::new() };
-    motions.into_iter().for_each(|record| found.take(flow, record));
-    found.count() == 1
+pub(crate) fn is_one(flow: &Flow, law: Law, motions: [Record; 2]) -> bool {
+    CellAttractors::count(flow, law, motions.into_iter()) == 1
 }
 
 /// Attractors of one cell.
@@ -59,8 +55,11 @@ struct CellAttractors {
 }
 
 impl CellAttractors {
-    fn count(&self) -> u8 {
-        (self.cycles.len() + usize::from(self.chaos) + usize::from(self.torus)) as u8
+    /// Counts the attractors that runs of a cell reach.
+    fn count(flow: &Flow, law: Law, runs: impl Iterator<Item = Record>) -> u8 {
+        let mut found = CellAttractors { law, chaos: false, torus: false, cycles: Vec::new() };
+        runs.for_each(|record| found.take(flow, &record));
+        (found.cycles.len() + usize::from(found.chaos) + usize::from(found.torus)) as u8
     }
 
     fn take(&mut self, flow: &Flow, record: &Record) {

@@ -129,6 +129,13 @@ pub struct Compared {
     pub is_odd: bool,
 }
 
+impl Compared {
+    /// Returns a quantity without dimension that mirror images share.
+    pub fn plain(name: &str) -> Compared {
+        Compared { name: name.to_owned(), dimension: Dimension::None, is_odd: false }
+    }
+}
+
 /// The values of quantities in the cells of two maps.
 pub struct Values<'a> {
     /// The quantities.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::findings::compare::{Compared, Comparison, Kind, TOLERANCE, Values, words_differ};
 use crate::map::bifurcation::{Column, Direction};
-use crate::record::measures::{self, Dimension};
+use crate::record::measures;
 
 /// Values of the axis at which the motion depends on the direction in which the attractor was followed. Manifests have its fields.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,17 +39,13 @@ pub fn hysteresis(columns: &[Column]) -> Option<Hysteresis> {
         Kind::of(up.class, down.class).or(other_pattern.then_some(Kind::Pattern))
     };
     let mut compared = Comparison { kinds: pairs.iter().map(kind).collect(), ..Comparison::default() };
-    let values = Values {
-        quantities: std::iter::repeat_n(Dimension::None, AVERAGES)
-            .map(|dimension| Compared { name: String::new(), dimension, is_odd: false })
-            .chain(measures::all().map(|measure| Compared {
-                name: String::new(),
-                dimension: measure.dimension(),
-                is_odd: measure.is_odd(),
-            }))
-            .collect(),
-        of: &|nth| pairs[nth].map(quantities),
-    };
+    let measured = measures::all().map(|measure| Compared {
+        dimension: measure.dimension(),
+        is_odd: measure.is_odd(),
+        ..Compared::plain("")
+    });
+    let all = [(); AVERAGES].map(|()| Compared::plain("")).into_iter().chain(measured);
+    let values = Values { quantities: all.collect(), of: &|nth| pairs[nth].map(quantities) };
     compared.take_quantities(&values, TOLERANCE, |nth| pairs[nth].map(|column| column.class));
     let [mut differing, mut by_pattern, mut by_quantity] = [(); 3].map(|()| Runs::default());
     for ([up, _], kind) in pairs.iter().zip(&compared.kinds) {

@@ -12,7 +12,6 @@ use crate::map::engine::Flows;
 use crate::map::plan::Plan;
 use crate::map::scene::{Points, Quantity, Scene};
 use crate::record::classify::classify;
-use crate::record::measures::Dimension;
 use crate::record::{Records, valid};
 use crate::show::cells::{Cells, Survey};
 use crate::show::map_pair::{MapPair, MapSide};
@@ -79,35 +78,31 @@ impl<'a> CompareJob<'a> {
         halt: &AtomicBool,
     ) -> Result<Option<MapComparison<'_>>, JobError> {
         let is_halted = || halt.load(Ordering::Relaxed);
+        let go_on = || (!is_halted()).then_some(());
         let read = |i: usize| LoadedMap::read(&self.maps[i], &self.scenes[i], observer);
         let mut loaded = [read(0)?, read(1)?];
-        if is_halted() {
-            return Ok(None);
-        }
-        let has_starts = loaded.iter().all(|map| map.plan.start_count() > 1);
-        let attractors = |plan: &Plan, records: &dyn Records| {
-            if has_starts && !is_halted() { coexistence::attractors(plan, records) } else { None }
+        let compared = move || {
+            go_on()?;
+            let has_starts = loaded.iter().all(|map| map.plan.start_count() > 1);
+            let attractors = |plan: &Plan, records: &dyn Records| {
+                if has_starts && !is_halted() { coexistence::attractors(plan, records) } else { None }
+            };
+            let counts = loaded.each_ref().map(|map| attractors(&map.plan, &map.stored.records));
+            go_on()?;
+            let [a, b] = [0, 1].map(|i| Side {
+                records: &loaded[i].stored.records,
+                attractors: counts[i].as_deref(),
+                has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
+            });
+            let mut comparison = compare::compare(loaded[0].plan.cell_count(), a, b);
+            compare_motions(&mut comparison, &loaded, &self.scenes, &is_halted);
+            go_on()?;
+            compare_quantities(&mut comparison, &loaded, &self.scenes, tolerance);
+            go_on()?;
+            let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
+            Some(MapComparison { job: self, loaded, surveys, comparison })
         };
-        let counts = loaded.each_ref().map(|map| attractors(&map.plan, &map.stored.records));
-        if is_halted() {
-            return Ok(None);
-        }
-        let [a, b] = [0, 1].map(|i| Side {
-            records: &loaded[i].stored.records,
-            attractors: counts[i].as_deref(),
-            has_exponents: self.scenes[i].outputs().quantities.contains(&Quantity::Lyapunov),
-        });
-        let mut comparison = compare::compare(loaded[0].plan.cell_count(), a, b);
-        compare_motions(&mut comparison, &loaded, &self.scenes, &is_halted);
-        if is_halted() {
-            return Ok(None);
-        }
-        compare_quantities(&mut comparison, &loaded, &self.scenes, tolerance);
-        if is_halted() {
-            return Ok(None);
-        }
-        let surveys = loaded.each_mut().map(|map| Survey::of_refinement(map.stored.refined.take()));
-        Ok(Some(MapComparison { job: self, loaded, surveys, comparison }))
+        Ok(compared())
     }
 }
 
@@ -136,8 +131,9 @@ fn compare_motions(
             return None;
         }
         let cell = plan.cell(id as u32);
-        let is_one = |flow: &_| coexistence::is_one(flow, plan.law(cell.law), [&a, &b]);
-        Some(a.strobe() == b.strobe() || flows.with(cell.flow, is_one))
+        let is_same = a.strobe() == b.strobe();
+        let is_one = |flow: &_| coexistence::is_one(flow, plan.law(cell.law), [a, b]);
+        Some(is_same || flows.with(cell.flow, is_one))
     });
 }
 
@@ -156,11 +152,7 @@ fn compare_quantities(
         .filter_map(|number| Some([number, b.iter().find(|other| other.name == number.name)?]))
         .collect();
     let has_mirror_images = loaded[0].plan.model(0).oscillator().is_ok_and(|of| of.mirror_symmetric());
-    let averages = ["impacts_per_period", "mesh_fraction"].map(|name| Compared {
-        name: name.to_owned(),
-        dimension: Dimension::None,
-        is_odd: false,
-    });
+    let averages = ["impacts_per_period", "mesh_fraction"].map(Compared::plain);
     let measured = shared.iter().map(|[number, _]| Compared {
         name: number.name.clone(),
         dimension: number.dimension,
