@@ -114,11 +114,7 @@ pub(super) fn read(
     let most = 2 * MOST_WALLS * gaps.len();
     let owner = if gaps.len() == 1 { "a model" } else { "a gap" };
     let some = format!("1 to {most} tables, [[contact]]: {owner} has up to 4 walls on each side");
-    let items = field.list(&some)?;
-    if !(1..=most).contains(&items.len()) {
-        return Err(field.wrong_count(items.len(), "tables", &some));
-    }
-    for item in &items {
+    for item in &field.list_of(1..=most, "tables", &some)? {
         let section = Section::open(item.node, &item.path, &CONTACT_KEYS)?;
         let gap = read_gap(&section, gaps)?;
         let (side, field, wall) = read_one(&section, names, defaults)?;

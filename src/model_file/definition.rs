@@ -167,7 +167,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
         let is = match (table, fields.get("side").or(fields.get("order")).map(|node| &node.value)) {
             (Table::Wall(gap, None), _) => is_of(gap),
             (Table::Wall(gap, Some((side, nth))), Some(Value::Text(name))) => {
-                let is_on_side = (name == "right") == (side == Side::Right) && is_of(gap);
+                let is_on_side = name == super::side(side) && is_of(gap);
                 before += usize::from(is_on_side);
                 is_on_side && before == nth
             }
@@ -315,12 +315,11 @@ impl Definition {
             let side = |side: Side| {
                 let walls = (1..).zip(&self.walls[nth][side.index()]);
                 let built = walls.map(|(i, wall)| {
-                    let word = ["right", "left"][side.index()];
                     let of_gap = match motion.gaps.len() {
                         1 => String::new(),
                         _ => format!(" of gap {}", nth + 1),
                     };
-                    values.wall(wall, stages, &format!("{word} wall {i}{of_gap}"))
+                    values.wall(wall, stages, &format!("{} wall {i}{of_gap}", super::side(side)))
                 });
                 built.collect::<Result<Vec<_>, _>>()
             };

@@ -145,11 +145,7 @@ impl Names<'_> {
         if T::MAY_CHANGE && self.stages > 0 {
             requirement += "; an entry may be a list with one value for each stage";
         }
-        let items = field.list(&requirement)?;
-        if items.len() != count {
-            return Err(field.out_of_range(&requirement));
-        }
-        items.iter().map(|item| T::read(item, self)).collect()
+        field.list_with(count, &requirement)?.iter().map(|item| T::read(item, self)).collect()
     }
 
     /// Reads a square matrix, row by row.
@@ -159,10 +155,7 @@ impl Names<'_> {
             2 => "a matrix of two rows, such as [[\"m1\", \"0\"], [\"0\", \"m2\"]]".to_owned(),
             _ => format!("a matrix of {} rows with {} each", NUMBERS[count - 1], entries(count)),
         };
-        let rows = field.list(&requirement)?;
-        if rows.len() != count {
-            return Err(field.out_of_range(&requirement));
-        }
+        let rows = field.list_with(count, &requirement)?;
         rows.iter().map(|row| self.vector(row, count, "a row")).collect()
     }
 

@@ -83,14 +83,12 @@ pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[S
             for (nth, wall) in (1..).zip(walls) {
                 let of_gap = if names.len() > 1 { format!(" of {z}") } else { String::new() };
                 let nth = if walls.len() > 1 { format!(" {nth}") } else { String::new() };
-                let (law, restitution, mesh_speed) = match &wall.law {
+                let (law, [restitution, mesh_speed]) = match &wall.law {
                     WallLaw::Impact { restitution, mesh_speed, .. } => {
-                        ("impact", text(restitution), text(mesh_speed))
+                        ("impact", [restitution, mesh_speed].map(text))
                     }
-                    WallLaw::Elastic { pulls: true } => ("elastic", String::new(), String::new()),
-                    WallLaw::Elastic { pulls: false } => {
-                        ("elastic, only pushes", String::new(), String::new())
-                    }
+                    WallLaw::Elastic { pulls: true } => ("elastic", Default::default()),
+                    WallLaw::Elastic { pulls: false } => ("elastic, only pushes", Default::default()),
                 };
                 let force = match &wall.spring {
                     None => format!("keeps {z} = {} while pressed", text(&wall.at)),
@@ -110,20 +108,12 @@ pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[S
                         sum(forces.clone())
                     }
                 };
-                let name = format!("{}{nth}{of_gap}", name(side));
+                let name = format!("{}{nth}{of_gap}", super::side(side));
                 rows.push([name, text(&wall.at), law.to_owned(), restitution, mesh_speed, force]);
             }
         }
     }
     rows
-}
-
-/// Returns the name of a side.
-pub(super) fn name(side: Side) -> &'static str {
-    match side {
-        Side::Right => "right",
-        Side::Left => "left",
-    }
 }
 
 fn row(entries: &[Expression], names: &[String], result: &str) -> String {
@@ -151,15 +141,9 @@ fn stages(motion: &MotionTable) -> Vec<String> {
 
 /// Returns the definition of a signal, such as `signal  seat = x'' - A*omega^2 cos(omega t)`.
 fn signal_line(signal: &Signal, motion: &MotionTable) -> String {
-    let rows = signal.rows.iter().zip(["", "'", "''"]).flat_map(|(row, suffix)| {
-        row.iter()
-            .zip(&motion.coordinates)
-            .map(move |(entry, name)| product(entry, &format!("{name}{suffix}")))
-    });
+    let rows = signal.rows.iter().zip(rates(motion)).flat_map(|(row, names)| terms(row, &names));
     let [own, cos, sin] = &signal.constants;
-    let phase = phase(&motion.frequency, 1);
-    let waves =
-        [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})")), constant(own)];
+    let waves = waves(motion, 1, [cos, sin]).into_iter().chain([constant(own)]);
     format!("signal  {} = {}", signal.name, sum(rows.chain(waves)))
 }
 
@@ -192,10 +176,7 @@ fn friction_force(friction: &DryFriction, motion: &MotionTable, i: usize) -> Opt
 /// Returns one equation per coordinate, with an optional force along the row of each gap.
 fn equations(definition: &Definition, forces: &[Option<String>]) -> impl Iterator<Item = String> {
     let motion = &definition.motion;
-    let rate = |suffix: &str| -> Vec<String> {
-        motion.coordinates.iter().map(|name| format!("{name}{suffix}")).collect()
-    };
-    let [accelerations, rates, displacements] = ["''", "'", ""].map(rate);
+    let [displacements, rates, accelerations] = rates(motion);
     (0..motion.degrees()).map(move |i| {
         let along = motion.gaps.iter().zip(forces);
         let along = along.map(|(gap, force)| product(&gap.row[i], force.as_deref()?)).collect();
@@ -206,14 +187,22 @@ fn equations(definition: &Definition, forces: &[Option<String>]) -> impl Iterato
             acting(definition).map(|friction| friction_force(friction, motion, i)).collect(),
             along,
         ];
-        let waves = |order: u32, cos: &Expression, sin: &Expression| {
-            let phase = phase(&motion.frequency, order);
-            [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})"))]
-        };
-        let further = motion.harmonics.iter().flat_map(|h| waves(h.order, &h.cos[i], &h.sin[i]));
-        let force = waves(1, &motion.force[i], &motion.force_sin[i]).into_iter().chain(further);
+        let further = motion.harmonics.iter().flat_map(|h| waves(motion, h.order, [&h.cos[i], &h.sin[i]]));
+        let force = waves(motion, 1, [&motion.force[i], &motion.force_sin[i]]).into_iter().chain(further);
         format!("{} = {}", sum(left.into_iter().flatten()), sum(force.chain([constant(&motion.load[i])])))
     })
+}
+
+/// Returns the names of the displacements, of their rates and of their accelerations.
+fn rates(motion: &MotionTable) -> [Vec<String>; 3] {
+    let rate = |suffix: &str| motion.coordinates.iter().map(|name| format!("{name}{suffix}")).collect();
+    ["", "'", "''"].map(rate)
+}
+
+/// Returns the cosine and the sine of a harmonic with these factors.
+fn waves(motion: &MotionTable, order: u32, [cos, sin]: [&Expression; 2]) -> [Option<String>; 2] {
+    let phase = phase(&motion.frequency, order);
+    [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})"))]
 }
 
 fn terms(entries: &[impl Entry], names: &[String]) -> Vec<Option<String>> {

@@ -46,10 +46,7 @@ pub(super) fn read(
         1 => "at most 1 table, [[friction]], for one coordinate: friction forces on it add to one".to_owned(),
         _ => format!("at most {MOST_FRICTION} tables, [[friction]], each with row and force"),
     };
-    let items = field.list(&tables)?;
-    if items.len() > count.min(MOST_FRICTION) {
-        return Err(field.wrong_count(items.len(), "tables", &tables));
-    }
+    let items = field.list_of(0..=count.min(MOST_FRICTION), "tables", &tables)?;
     let read_one = |item: &Field<'_>| {
         let section = Section::open(item.node, &item.path, &FRICTION_KEYS)?;
         let row = match section.get("row") {

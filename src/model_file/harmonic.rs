@@ -33,12 +33,8 @@ pub(super) fn read(
         "at most {MOST_HARMONICS} tables, [[harmonic]], each with order and with cos, sin or both; order 1 is `force` and \
          `force_sin` in [motion]"
     );
-    let items = field.list(&tables)?;
-    if items.len() > MOST_HARMONICS {
-        return Err(field.wrong_count(items.len(), "tables", &tables));
-    }
     let mut harmonics: Vec<HarmonicForce> = Vec::new();
-    for item in &items {
+    for item in &field.list_of(0..=MOST_HARMONICS, "tables", &tables)? {
         let section = Section::open(item.node, &item.path, &HARMONIC_KEYS)?;
         let field = section.require("order", "write order = 2 for twice the frequency")?;
         if let Value::Integer(1) = field.node.value {

@@ -20,7 +20,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, Units};
+use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, Side, Units};
 
 pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
@@ -94,6 +94,14 @@ impl FileModel {
 
     fn new(definition: Definition) -> FileModel {
         FileModel { values: definition.defaults.clone(), definition: Arc::new(definition), start_phase: 0.0 }
+    }
+}
+
+/// Returns the name of a side in model files and in texts.
+pub fn side(side: Side) -> &'static str {
+    match side {
+        Side::Right => "right",
+        Side::Left => "left",
     }
 }
 

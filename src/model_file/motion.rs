@@ -108,9 +108,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<MotionTable, 
     let velocities = match section.get("velocities") {
         Some(field) => {
             let velocities = read_names(&field, each)?;
-            if velocities.len() != count {
-                return Err(field.out_of_range(each));
-            }
+            field.list_with(count, each)?;
             velocities
         }
         None if count == 1 => vec!["v".to_owned()],
@@ -128,10 +126,7 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<MotionTable, 
     }
     let bodies = match section.get("bodies") {
         Some(field) => {
-            let items = field.list(each)?;
-            if items.len() != count {
-                return Err(field.out_of_range(each));
-            }
+            let items = field.list_with(count, each)?;
             items.iter().map(|item| item.line(LONGEST_BODY)).collect::<Result<_, _>>()?
         }
         None => coordinates.clone(),
@@ -211,10 +206,7 @@ fn read_units(section: &Section<'_>, count: usize, gaps: &[Gap]) -> Result<Units
     let each = "a list of units, one for each coordinate, such as [\"mm\"]";
     let coordinates = match section.get("units") {
         Some(field) => {
-            let items = field.list(each)?;
-            if items.len() != count {
-                return Err(field.out_of_range(each));
-            }
+            let items = field.list_with(count, each)?;
             items.iter().map(|item| read_unit(item).map(Some)).collect::<Result<_, _>>()?
         }
         None => vec![None; count],

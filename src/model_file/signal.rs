@@ -50,12 +50,8 @@ pub(super) fn read(
 ) -> Result<Vec<Signal>, SceneError> {
     let Some(field) = root.get("signal") else { return Ok(Vec::new()) };
     let tables = format!("at most {MOST_SIGNALS} tables, [[signal]], each with a name and a row");
-    let items = field.list(&tables)?;
-    if items.len() > MOST_SIGNALS {
-        return Err(field.wrong_count(items.len(), "tables", &tables));
-    }
     let mut signals: Vec<Signal> = Vec::new();
-    for item in &items {
+    for item in &field.list_of(0..=MOST_SIGNALS, "tables", &tables)? {
         let signal = read_one(item, names, count)?;
         let taken = signals.iter().map(|other| other.name.as_str()).chain(gaps.iter().copied());
         let mut taken = taken.chain(names.parameters.iter().chain(names.states).copied());

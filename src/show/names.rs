@@ -1,6 +1,7 @@
 //! Names in output files. They are part of the contract with scripts.
 
 use crate::map::scene::Format;
+pub use crate::model_file::side;
 use rattlemap_dynamics::model::Side;
 use rattlemap_dynamics::orbit::Class;
 
@@ -27,14 +28,6 @@ pub fn side_code(side: Side) -> i8 {
     match side {
         Side::Right => 1,
         Side::Left => -1,
-    }
-}
-
-/// Returns the name of a side in texts.
-pub fn side(side: Side) -> &'static str {
-    match side {
-        Side::Right => "right",
-        Side::Left => "left",
     }
 }
 

@@ -262,6 +262,27 @@ impl<'a> Field<'a> {
         Ok(items.iter().enumerate().map(element).collect())
     }
 
+    /// Returns the elements of a list whose number is within `range`. `things` are the elements in messages.
+    pub(crate) fn list_of(
+        &self,
+        range: RangeInclusive<usize>,
+        things: &str,
+        expected: &str,
+    ) -> Result<Vec<Field<'a>>, SceneError> {
+        let items = self.list(expected)?;
+        if range.contains(&items.len()) {
+            Ok(items)
+        } else {
+            Err(self.wrong_count(items.len(), things, expected))
+        }
+    }
+
+    /// Returns the elements of a list that must have `count` of them.
+    pub(crate) fn list_with(&self, count: usize, expected: &str) -> Result<Vec<Field<'a>>, SceneError> {
+        let items = self.list(expected)?;
+        if items.len() == count { Ok(items) } else { Err(self.out_of_range(expected)) }
+    }
+
     /// Reads a list of one or more names from `choices`. Repeated names are ignored.
     pub(crate) fn choices<T: Copy + PartialEq>(&self, choices: &[(&str, T)]) -> Result<Vec<T>, SceneError> {
         let names = choices.iter().map(|&(name, _)| name).collect::<Vec<_>>().join(", ");
