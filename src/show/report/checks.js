@@ -48,10 +48,7 @@ const fieldName = (name) => FIELDS[name] ?? spaced(name);
 // Returns the first columns of a cell: a button that shows it on the map, and the values of its parameters.
 /** @param {any} cell */
 function place({ i, j, values }) {
-  const go = element("button", `${i}, ${j}`);
-  go.type = "button";
-  go.title = "show this cell on the map";
-  go.addEventListener("click", () => {
+  const go = newButton(`${i}, ${j}`, "show this cell on the map", () => {
     choose({ i, j });
     follow({ i, j });
     scrollTo({ top: 0, behavior: "smooth" });

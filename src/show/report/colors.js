@@ -134,15 +134,11 @@ function showLegend(current) {
       item.append(...parts);
       return item;
     }
-    const button = element("button");
-    button.type = "button";
-    button.title = "show these cells alone";
-    button.setAttribute("aria-pressed", text === isolated);
-    button.append(...parts);
-    button.addEventListener("click", () => {
+    const button = newButton(parts, "show these cells alone", () => {
       isolated = text === isolated ? null : text;
       fitColors();
     });
+    button.setAttribute("aria-pressed", text === isolated);
     item.append(button);
     return item;
   }));

@@ -130,3 +130,10 @@ const element = (tag, text, className) => {
   if (className) node.className = className;
   return node;
 };
+/** @type {(content: any, title: string, act: () => void) => any} */
+const newButton = (content, title, act) => {
+  const button = Object.assign(element("button"), { type: "button", title });
+  button.append(...[content].flat());
+  button.addEventListener("click", act);
+  return button;
+};

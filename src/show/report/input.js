@@ -4,12 +4,16 @@
 /** @type {(axis: Axis) => number} */
 const leastExtent = (axis) => (map.live && axis.scale !== "values" ? 1e-9 * axis.count : Math.min(4, axis.count));
 
+// Returns the nearest width and height that a view may have.
+/** @type {(width: number, height: number) => number[]} */
+const allowed = (width, height) =>
+  [within(width, leastExtent(map.axes[0]), columns), within(height, leastExtent(map.axes[1]), rows)];
+
 /** @type {(factor: number, x: number, y: number) => void} */
 function zoom(factor, x, y) {
   const p = plotArea();
   const [u, v] = [(x - p.x) / p.width, (p.y + p.height - y) / p.height];
-  const width = within(view.width * factor, leastExtent(map.axes[0]), columns);
-  const height = within(view.height * factor, leastExtent(map.axes[1]), rows);
+  const [width, height] = allowed(view.width * factor, view.height * factor);
   view = { left: view.left + u * (view.width - width), bottom: view.bottom + v * (view.height - height), width, height };
   keepInside();
 }
@@ -113,7 +117,8 @@ function hover(at = hovered) {
 // Shows a rectangle, in cells. One that is too small or outside the map is enlarged or moved.
 /** @type {(place: Place) => void} */
 function showView({ left, bottom, width, height }) {
-  view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
+  const [across, up] = allowed(width, height);
+  view = { left, bottom, width: across, height: up };
   keepInside();
 }
 const showAll = () => showView(everything);
@@ -215,7 +220,8 @@ function readLink(text) {
   const [left, bottom, width, height] = numbers("view");
   view = { ...everything };
   if ([left, bottom, width, height].every(Number.isFinite)) {
-    view = { left, bottom, width: within(width, leastExtent(map.axes[0]), columns), height: within(height, leastExtent(map.axes[1]), rows) };
+    const [across, up] = allowed(width, height);
+    view = { left, bottom, width: across, height: up };
   }
   const [i, j] = numbers("cell");
   /** @type {(index: number, count: number) => boolean} */

@@ -35,9 +35,13 @@ function windowAlong(axis, from, extent) {
   return { min: axisValue(axis, first), max: axisValue(axis, last), cover };
 }
 
+// Returns the extents of a view in cells; 0 along an axis whose values are listed.
+/** @type {(place: Place) => number[]} */
+const extentsOf = ({ width, height }) => map.axes.map((axis, k) => (axis.scale === "values" ? 0 : [width, height][k]));
+
 // Begins the window that the view needs, unless it is there or under way.
 function wish() {
-  const extents = map.axes.map((axis, k) => (axis.scale === "values" ? 0 : [view.width, view.height][k]));
+  const extents = extentsOf(view);
   const isFine = extents.every((extent) => extent === 0) || extents.some((extent) => extent >= FINEST);
   const suffices = !isChanged() && (isFine || !byId("refine").checked || (showsAll() && !map.live?.at_once));
   if (!map.live || suffices) {
@@ -68,7 +72,7 @@ const countAt = (level) => (COARSEST - 1) * 2 ** level + 1;
 // Returns the first level that is not coarser than what the program's map shows.
 function firstLevel() {
   if (isChanged()) return 0;
-  const most = Math.max(...map.axes.map((axis, k) => (axis.scale === "values" ? 0 : [view.width, view.height][k])));
+  const most = Math.max(...extentsOf(view));
   let level = 0;
   while (countAt(level) < most && countAt(level + 1) <= FINEST) level += 1;
   return level;
@@ -426,15 +430,13 @@ function showParameters() {
   byId("parameters").hidden = byId("compare").hidden = !map.live;
   play(null);
   byId("sliders").replaceChildren(...map.parameters.map(({ name, symbol, label, value, min, max }) => {
-    const [slider, field] = ["range", "number"].map((type) => Object.assign(element("input"), { type }));
+    const [slider, field] = ["range", "number"].map((type) => Object.assign(element("input"), { type, step: "any" }));
+    for (const input of [slider, field]) input.setAttribute("aria-label", label);
     const now = changes[name] ?? value;
     const span = Math.abs(value) || 1;
     slider.min = Math.max(min ?? -Infinity, value < 0 || min === null ? value - span : 0);
     slider.max = Math.min(max ?? Infinity, value + span);
-    slider.step = field.step = "any";
     [slider.value, field.value] = [now, now];
-    slider.setAttribute("aria-label", label);
-    field.setAttribute("aria-label", label);
     /** @type {(text: string) => void} */
     const change = (text) => {
       const number = Number(text);
@@ -452,14 +454,13 @@ function showParameters() {
     const row = element("label");
     const text = element("span", symbol);
     text.title = label;
-    const button = Object.assign(element("button", "\u25b6"), { type: "button", title: `play ${label}` });
-    button.setAttribute("aria-label", button.title);
-    button.setAttribute("aria-pressed", "false");
     const [low, high] = [slider.min, slider.max].map(Number);
-    button.addEventListener("click", () => play(button, () => {
+    const button = newButton("\u25b6", `play ${label}`, () => play(button, () => {
       const next = Number((Number(slider.value) + (high - low) / PLAYED).toPrecision(4));
       change(String(next > high ? low : next));
     }));
+    button.setAttribute("aria-label", button.title);
+    button.setAttribute("aria-pressed", "false");
     row.append(text, slider, field, button);
     return row;
   }));

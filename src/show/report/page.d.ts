@@ -4,12 +4,7 @@
 declare const WORKER: { data: string, type: string };
 
 // A rectangle, in cells of the program's map.
-interface Place {
-  left: number;
-  bottom: number;
-  width: number;
-  height: number;
-}
+type Place = { left: number, bottom: number, width: number, height: number };
 
 // The object of src/show/report.rs, after `fill` has unpacked its arrays.
 interface MapData {
@@ -49,25 +44,12 @@ interface MapData {
   validation: Validation | null;
 }
 
-interface Packed {
-  type: string;
-  data: string;
-}
+type Packed = { type: string, data: string };
 
-interface Parameter {
-  name: string;
-  symbol: string;
-  label: string;
-  value: number;
-  min: number | null;
-  max: number | null;
-}
+type Parameter = { name: string, symbol: string, label: string, value: number, min: number | null, max: number | null };
 
 // Positions on a scale with their labels, and the common factor of these. `asked` is the request that they answer.
-interface Ticks {
-  marks: [number, string][];
-  factor: string;
-}
+type Ticks = { marks: [number, string][], factor: string };
 
 interface Axis {
   parameter: string;
@@ -85,24 +67,11 @@ interface Axis {
 }
 
 // The values of an axis of a view: its ends and their number, or a list.
-interface Span {
-  min?: any;
-  max?: any;
-  count?: number;
-  values?: number[];
-}
+type Span = { min?: any, max?: any, count?: number, values?: number[] };
 
-interface Derived extends Packed {
-  parameter: string;
-  along: boolean[];
-  values?: any;
-}
+type Derived = Packed & { parameter: string, along: boolean[], values?: any };
 
-interface Entry {
-  color: string;
-  text: string;
-  share: string;
-}
+type Entry = { color: string, text: string, share: string };
 
 interface Bar {
   label: string;
@@ -135,10 +104,7 @@ interface Layer {
   key?: string;
 }
 
-interface Refinement {
-  lines: string[];
-  audits: { sampled: number, wrong: number }[];
-}
+type Refinement = { lines: string[], audits: { sampled: number, wrong: number }[] };
 
 // The object of src/show/validation.rs.
 interface Validation {
@@ -157,17 +123,9 @@ interface Validation {
   mismatches: (JudgedCell & { kind: string, differences: { field: string, map: any, judge: any }[] })[];
 }
 
-interface Share {
-  count: number;
-  text: string;
-}
+type Share = { count: number, text: string };
 
-interface JudgedCell {
-  i: number;
-  j: number;
-  values: Record<string, number>;
-  replay: string;
-}
+type JudgedCell = { i: number, j: number, values: Record<string, number>, replay: string };
 
 interface ChaosEnds {
   cells: (JudgedCell & { class: string, period: number | null, periods_run: number })[];
@@ -177,15 +135,10 @@ interface ChaosEnds {
 }
 
 // A row of a table, marked if it is bad.
-interface Row {
-  cells: any[];
-  bad?: boolean;
-}
+type Row = { cells: any[], bad?: boolean };
 
 // The values that a window needs along an axis, and the part of the axis that a number of cells covers.
-interface Along extends Span {
-  cover: (count: number) => [number, number];
-}
+type Along = Span & { cover: (count: number) => [number, number] };
 
 // The part of the map that workers compute.
 interface Job {
@@ -218,12 +171,7 @@ interface Job {
 }
 
 // A worker, and its request, the number of cells that it computes per ms, and whether its shaders are compiled.
-interface Member {
-  worker: any;
-  request: any;
-  per_ms: number;
-  isReady?: boolean;
-}
+type Member = { worker: any, request: any, per_ms: number, isReady?: boolean };
 
 // A map to draw.
 interface Sheet {
@@ -244,8 +192,4 @@ interface Sheet {
 }
 
 // A cell of a sheet.
-interface Cell {
-  sheet: Sheet;
-  i: number;
-  j: number;
-}
+type Cell = { sheet: Sheet, i: number, j: number };

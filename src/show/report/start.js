@@ -18,10 +18,8 @@ async function start() {
   if (map.sketch) byId("sketch").src = URL.createObjectURL(new Blob([await unpack(map.sketch)], { type: "image/svg+xml" }));
   if (map.values.word || map.values.pattern) byId("letters").textContent = map.letters ?? "";
   byId("layers").append(...map.layers.map(({ short }, k) => {
-    const button = element("button", short);
-    button.type = "button";
+    const button = newButton(short, "", () => showLayer(k));
     button.setAttribute("role", "radio");
-    button.addEventListener("click", () => showLayer(k));
     return button;
   }));
   byId("layers").addEventListener("keydown", (/** @type {KeyboardEvent} */ { key }) => {
