@@ -65,22 +65,14 @@ impl PlaceNames {
 
     /// Returns the columns of this model with the name for an event, or for no event. A name that an event does not have is empty.
     pub(crate) fn columns(&self, place: Option<Place>) -> Vec<(&'static str, &str)> {
-        let gap = match place {
-            Some(Place::Wall { gap, .. }) => Some(gap),
-            _ => None,
+        let [gap, element] = match place {
+            Some(Place::Wall { gap, .. }) => [Some(gap), None],
+            Some(Place::Element { element, .. }) => [None, Some(element)],
+            None => [None; 2],
         };
-        let element = match place {
-            Some(Place::Element { element, .. }) => Some(element),
-            _ => None,
-        };
-        let mut columns = Vec::new();
-        if let Some(gaps) = &self.gaps {
-            columns.push(("gap", gap.map_or("", |gap| gaps[gap].as_str())));
-        }
-        if let Some(elements) = &self.elements {
-            columns.push(("element", element.map_or("", |element| elements[element].as_str())));
-        }
-        columns
+        let columns = [("gap", &self.gaps, gap), ("element", &self.elements, element)].into_iter();
+        let own = columns.filter_map(|(column, names, nth)| Some((column, names.as_ref()?, nth)));
+        own.map(|(column, names, nth)| (column, nth.map_or("", |nth| names[nth].as_str()))).collect()
     }
 }
 

@@ -61,8 +61,8 @@ pub fn of(cells: &Cells<'_>, words: &MapWords) -> Vec<Layer> {
         layers.push(if layers.is_empty() { classes } else { Layer { name: CLASS.into(), ..classes } });
     }
     layers.extend(continuous::layers(cells));
-    layers.extend(words.patterns.as_ref().map(words::patterns));
-    layers.extend(words.words.as_ref().map(words::words));
+    layers.extend(words.patterns.iter().map(|index| words::layer(index, words::PATTERNS)));
+    layers.extend(words.words.iter().map(|index| words::layer(index, words::WORDS)));
     layers.extend(cells.attractors().map(attractors::layer));
     layers
 }

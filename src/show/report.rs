@@ -234,17 +234,8 @@ fn audits(cells: &Cells<'_>, refined: &Refined) -> Value {
 /// `ends` are values on a linear axis, decimal logarithms on a logarithmic one, and indices of `listed` values. The part is
 /// `length` long, and labels are `spacing` apart where possible.
 pub fn ticks(scale: Scale, ends: [f64; 2], listed: &[f64], length: f64, spacing: f64) -> Value {
-    let scale = match scale {
-        Scale::Linear => drawing::axis::Scale::Linear,
-        Scale::Log => drawing::axis::Scale::Logarithmic,
-        Scale::Values => drawing::axis::Scale::Listed,
-    };
-    let [low, high] = ends;
-    ticks_of(
-        &drawing::axis::Axis { label: String::new(), low, high, scale, listed: listed.to_vec() },
-        length,
-        spacing,
-    )
+    let ([low, high], listed) = (ends, listed.to_vec());
+    ticks_of(&drawing::axis::Axis { label: String::new(), low, high, scale, listed }, length, spacing)
 }
 
 fn ticks_of(axis: &drawing::axis::Axis, length: f64, spacing: f64) -> Value {

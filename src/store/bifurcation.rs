@@ -4,9 +4,8 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use crate::map::bifurcation::{Column, fixed};
-use crate::map::scene::{self, Along, Format, Scene};
+use crate::map::scene::{Along, Format, Scene};
 use crate::model_file::several_gaps;
-use crate::show::drawing::axis::Scale;
 use crate::show::drawing::write_figure;
 use crate::show::figure;
 use crate::show::figure::bifurcation::Panels;
@@ -78,13 +77,8 @@ pub fn write(
         let label = axis_label(parameter);
         let title = format!("{}{}", scene.title(), line(arguments.along));
         let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
-        let scale = match scene.axes()[0].scale() {
-            scene::Scale::Log => Scale::Logarithmic,
-            scene::Scale::Linear => Scale::Linear,
-            scene::Scale::Values => Scale::Listed,
-        };
-        let (texts, style) = ([&*title, &*subtitle], scene.figure_style());
-        let figure = figure::bifurcation::draw(style, texts, (&label, scale), panels, columns);
+        let (texts, axis) = ([&*title, &*subtitle], (&*label, scene.axes()[0].scale()));
+        let figure = figure::bifurcation::draw(scene.figure_style(), texts, axis, panels, columns);
         for (format, name) in names.iter().filter(|(format, _)| wanted.contains(format)) {
             folder.replace(name, |out| write_figure(out, *format, &figure))?;
             files.push(name);

@@ -219,13 +219,5 @@ pub(crate) fn moments(
     samples_per_period: usize,
 ) -> Result<Vec<Moment>, ModelError> {
     let samples = trace(model, orbit.strobe, orbit.strobe_meshing, orbit.cycle_periods, samples_per_period)?;
-    let history = History {
-        meshing: orbit.strobe_meshing,
-        samples,
-        events: orbit.events.clone(),
-        slips: orbit.slips.clone(),
-        samples_per_period,
-        forcing_period: orbit.forcing_period,
-    };
-    orbit_tables::moments(model, &history)
+    orbit_tables::moments(model, &orbit_tables::sampled(orbit, samples, samples_per_period))
 }

@@ -6,8 +6,7 @@ use std::io::Read;
 
 use image::RgbImage;
 use rattlemap::map::bifurcation::{Column, Direction, SectionPoint};
-use rattlemap::map::scene::{FigureStyle, Format};
-use rattlemap::show::drawing::axis::Scale;
+use rattlemap::map::scene::{FigureStyle, Format, Scale};
 use rattlemap::show::drawing::write_figure;
 use rattlemap::show::figure::bifurcation::{self, Panels};
 use rattlemap::show::figure::orbit::{OrbitFigure, OrbitPlot};
@@ -385,7 +384,7 @@ fn a_logarithmic_axis_has_its_decades() {
         // A linear axis up to 10,000 also has a tick at 1000.
         ["10", "100"].map(|label| svg.contains(&format!(">{label}</text>")))
     };
-    assert_eq!(ticks(Scale::Logarithmic), [true; 2]);
+    assert_eq!(ticks(Scale::Log), [true; 2]);
     assert_eq!(ticks(Scale::Linear), [false; 2]);
 }
 

@@ -1,21 +1,12 @@
 //! One axis of a panel: its range, its scale and its label.
 
+use crate::map::scene::Scale;
+
 /// Margin between the data and each end of an axis, as a share of the data's span.
 const PADDING: f64 = 0.06;
 /// Values whose relative spread is at most `CONSTANT` count as one value. Their axis spans `CONSTANT_SPAN` of it.
 const CONSTANT: f64 = 1e-9;
 const CONSTANT_SPAN: f64 = 0.2;
-
-/// How values are placed on an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// In proportion.
-    Linear,
-    /// By decimal logarithms.
-    Logarithmic,
-    /// In the order of a list, at equal distances: at 0, 1, 2 ...
-    Listed,
-}
 
 /// An axis.
 #[derive(Clone, Debug)]
@@ -26,7 +17,7 @@ pub struct Axis {
     pub low: f64,
     /// Upper end on the scale.
     pub high: f64,
-    /// Scale.
+    /// How values are placed: in proportion, by decimal logarithms, or in the order of a list, at 0, 1, 2 ...
     pub scale: Scale,
     /// Ascending values of a listed axis; empty for other scales.
     pub listed: Vec<f64>,
@@ -45,13 +36,13 @@ impl Axis {
     pub fn listed(label: &str, values: impl Iterator<Item = f64>) -> Axis {
         let listed: Vec<f64> = values.collect();
         let high = listed.len() as f64 - 0.5;
-        Axis { listed, scale: Scale::Listed, ..Axis::exact(label, -0.5, high) }
+        Axis { listed, scale: Scale::Values, ..Axis::exact(label, -0.5, high) }
     }
 
     /// Returns a logarithmic axis that extends by `beyond` from the logarithms of two positive values.
     pub(crate) fn logarithmic(label: &str, [low, high]: [f64; 2], beyond: f64) -> Axis {
         let axis = Axis::exact(label, low.log10() - beyond, high.log10() + beyond);
-        Axis { scale: Scale::Logarithmic, ..axis }
+        Axis { scale: Scale::Log, ..axis }
     }
 
     /// Returns a linear axis that holds all finite `values` with a margin.
@@ -72,7 +63,7 @@ impl Axis {
     /// Returns a logarithmic axis that holds all positive `values` with a margin and spans at least `least_decades`.
     pub fn around_logarithms(label: &str, values: impl Iterator<Item = f64>, least_decades: f64) -> Axis {
         let axis = Axis::around(label, values.filter(|v| *v > 0.0).map(f64::log10), least_decades);
-        Axis { scale: Scale::Logarithmic, ..axis }
+        Axis { scale: Scale::Log, ..axis }
     }
 
     /// Returns a logarithmic axis of whole decades, at least one, that holds all positive `values`.
@@ -80,15 +71,15 @@ impl Axis {
         let logarithms = values.filter(|v| *v > 0.0).map(f64::log10);
         let (low, high) = ends(logarithms).unwrap_or((-1.0, 1.0));
         let axis = Axis::exact(label, low.floor(), high.ceil().max(low.floor() + 1.0));
-        Axis { scale: Scale::Logarithmic, ..axis }
+        Axis { scale: Scale::Log, ..axis }
     }
 
     /// Returns the value at a position on the scale. Between two listed values it is interpolated.
     pub(crate) fn value(&self, place: f64) -> f64 {
         match self.scale {
             Scale::Linear => place,
-            Scale::Logarithmic => 10f64.powf(place),
-            Scale::Listed => {
+            Scale::Log => 10f64.powf(place),
+            Scale::Values => {
                 let last = self.listed.len() - 1;
                 let place = place.clamp(0.0, last as f64);
                 let before = place as usize;
@@ -103,8 +94,8 @@ impl Axis {
     pub(crate) fn place(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear => value,
-            Scale::Logarithmic => value.log10().clamp(self.low, self.high),
-            Scale::Listed => self.listed.partition_point(|listed| *listed < value) as f64,
+            Scale::Log => value.log10().clamp(self.low, self.high),
+            Scale::Values => self.listed.partition_point(|listed| *listed < value) as f64,
         }
     }
 }

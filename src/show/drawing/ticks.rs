@@ -1,6 +1,7 @@
 //! Ticks of an axis: which values are marked, and their labels.
 
-use crate::show::drawing::axis::{Axis, Scale};
+use crate::map::scene::Scale;
+use crate::show::drawing::axis::Axis;
 use crate::show::symbols::{number, superscript};
 
 /// A mark on an axis.
@@ -36,8 +37,8 @@ pub(crate) fn ticks(axis: &Axis, length: f64, spacing: f64) -> Ticks {
     let plain = |list| Ticks { list, power: 0 };
     match axis.scale {
         Scale::Linear => linear(axis, length / spacing),
-        Scale::Logarithmic => logarithmic(axis, length, spacing),
-        Scale::Listed => plain(listed(axis, length, spacing)),
+        Scale::Log => logarithmic(axis, length, spacing),
+        Scale::Values => plain(listed(axis, length, spacing)),
     }
 }
 
@@ -249,7 +250,7 @@ mod tests {
     fn the_number_of_ticks_of_extreme_axes_is_limited() {
         for (low, high) in [(1e300, -1e300), (-1e300, 1e300), (1e-12, 1.1e-12), (0.0, 0.0)] {
             assert!(ticks(&Axis::exact("", low, high), 8.0, 1.0).list.len() <= 101, "{low} {high}");
-            let logarithmic = Axis { scale: Scale::Logarithmic, ..Axis::exact("", low, high) };
+            let logarithmic = Axis { scale: Scale::Log, ..Axis::exact("", low, high) };
             assert!(ticks(&logarithmic, 800.0, 100.0).list.len() <= 901, "{low} {high}");
         }
     }

@@ -6,9 +6,9 @@ mod exponents;
 mod panels;
 
 use crate::map::bifurcation::{Column, Direction};
-use crate::map::scene::FigureStyle;
+use crate::map::scene::{FigureStyle, Scale};
 use crate::show::color::Color;
-use crate::show::drawing::axis::{Axis, Scale};
+use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
 use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Point, Rect, wall_color};
@@ -124,14 +124,10 @@ fn quantity_axis(panel: &Panel, columns: &[Column]) -> Axis {
 fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry> {
     let dot = |color: Color, text: &str| Entry::new(Key::Marker(Marker::dot(color, 6.0)), text);
     let patch = |color, opacity, text| Entry::new(Key::Patch { color, opacity }, text);
-    let has = |index: usize| columns.iter().any(|column| column.class.index() == index);
     let has_exponents = panels.has(&[States::Exponents]);
-    let is_periodic = has_exponents && has(Class::Periodic { period: 1 }.index());
-    let is_chaotic = has_exponents && has(Class::Chaotic.index());
-    let has_tori = has_exponents && has(Class::QuasiPeriodic.index());
-    let torus = class_color(Class::QuasiPeriodic);
-    let periodic = class_color(Class::Periodic { period: 1 });
-    let chaotic = class_color(Class::Chaotic);
+    let has = |class: &Class| columns.iter().any(|column| column.class.index() == class.index());
+    let classes = [Class::Periodic { period: 1 }, Class::Chaotic, Class::QuasiPeriodic].into_iter();
+    let classes = classes.filter(|class| has_exponents && has(class));
     let mut entries = Vec::new();
     let shows_walls = panels.has(&[States::Crossings, States::Contacts]);
     match coloring {
@@ -139,9 +135,7 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
             let walls = Side::BOTH.into_iter().filter(|side| shows_walls && panels.walls.has(*side));
             entries.extend(walls.map(|side| dot(wall_color(side), &panels.walls.entry(side))));
             entries.extend(panels.has(&[States::Strobes]).then(|| dot(STROBE, "phase 0 of each period")));
-            entries.extend(is_periodic.then(|| dot(periodic, "\u{3bb}: periodic")));
-            entries.extend(is_chaotic.then(|| dot(chaotic, "\u{3bb}: chaotic")));
-            entries.extend(has_tori.then(|| dot(torus, "\u{3bb}: quasi-periodic")));
+            entries.extend(classes.map(|of| dot(class_color(of), &format!("\u{3bb}: {}", of.name()))));
         }
         Coloring::Directions => {
             for ((direction, text), width) in Direction::ALL.into_iter().zip(DIRECTIONS).zip(LINES) {
@@ -150,13 +144,11 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
             }
             let both = panels.list.iter().any(|panel| panel.states != States::None);
             entries.extend(both.then(|| dot(both_directions(), "both")));
-            entries.extend(is_periodic.then(|| patch(periodic, 1.0, "periodic")));
-            entries.extend(is_chaotic.then(|| patch(chaotic, 1.0, "chaotic")));
-            entries.extend(has_tori.then(|| patch(torus, 1.0, "quasi-periodic")));
+            entries.extend(classes.map(|of| patch(class_color(of), 1.0, of.name())));
         }
     }
     if has_exponents && columns.iter().any(|column| column.lyapunov_error.is_some()) {
-        entries.push(patch(chaotic, exponents::ERROR_BAND, "\u{3bb}: standard error"));
+        entries.push(patch(class_color(Class::Chaotic), exponents::ERROR_BAND, "\u{3bb}: standard error"));
     }
     if columns.iter().any(is_marked) && panels.list.iter().any(|panel| panel.states != States::Exponents) {
         entries.push(Entry::new(Key::Mark { color: FAINT }, "undecided or failed"));
@@ -166,7 +158,7 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
 
 /// Returns the axis of the parameter, with room for the dots of the first and last columns.
 fn value_axis((label, scale): (&str, Scale), columns: &[Column]) -> Axis {
-    if scale == Scale::Listed {
+    if scale == Scale::Values {
         let mut values: Vec<f64> =
             columns.iter().map(|c| c.value).filter(|value| value.is_finite()).collect();
         values.sort_by(f64::total_cmp);
@@ -175,8 +167,8 @@ fn value_axis((label, scale): (&str, Scale), columns: &[Column]) -> Axis {
         return Axis::listed(label, values.into_iter());
     }
     let place = |value: f64| match scale {
-        Scale::Linear | Scale::Listed => value,
-        Scale::Logarithmic => value.log10(),
+        Scale::Linear | Scale::Values => value,
+        Scale::Log => value.log10(),
     };
     let places = columns.iter().map(|c| place(c.value)).filter(|place| place.is_finite());
     let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));

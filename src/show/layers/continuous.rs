@@ -50,47 +50,31 @@ impl Colors {
     }
 }
 
+/// Short name, title, colours and value of the quantities that every row has.
+type Fixed = (Quantity, &'static str, &'static str, Colors, fn(&Row) -> Option<f64>);
+
+#[rustfmt::skip]
+const FIXED: [Fixed; 3] = [
+    (Quantity::Lyapunov, "exponent", "largest Lyapunov exponent, \u{3bb}", Colors::Exponents, |row| row.lyapunov),
+    (Quantity::Impacts, "impacts", "impacts per forcing period", Colors::Sequential, |row| row.impacts_per_period),
+    (Quantity::Mesh, "meshing", "fraction of time in meshing", Colors::Sequential, |row| row.mesh_fraction),
+];
+
 /// Number of colours. The next index is for cells without a value.
 const LEVELS: u8 = 255;
 
 /// Returns the layers of the continuous quantities that the scene requests.
 pub(crate) fn layers<'c>(cells: &'c Cells<'c>) -> impl Iterator<Item = Layer> + 'c {
-    let fixed = [
-        (
-            Quantity::Lyapunov,
-            fixed("lyapunov", "exponent", "largest Lyapunov exponent, \u{3bb}", Colors::Exponents, |row| {
-                row.lyapunov
-            }),
-        ),
-        (
-            Quantity::Impacts,
-            fixed("impacts", "impacts", "impacts per forcing period", Colors::Sequential, |row| {
-                row.impacts_per_period
-            }),
-        ),
-        (
-            Quantity::Mesh,
-            fixed("mesh", "meshing", "fraction of time in meshing", Colors::Sequential, |row| {
-                row.mesh_fraction
-            }),
-        ),
-    ];
-    let fixed =
-        fixed.into_iter().filter(|(quantity, _)| cells.has(*quantity)).map(|(_, continuous)| continuous);
-    fixed
-        .chain(cells.numbers().into_iter().map(|number| measured(cells, number)))
-        .map(|continuous| continuous.layer(cells))
-}
-
-fn fixed(
-    name: &'static str,
-    short: &'static str,
-    title: &'static str,
-    colors: Colors,
-    value: fn(&Row) -> Option<f64>,
-) -> Continuous<'static> {
-    let value = Box::new(move |_, row: &Row| value(row));
-    Continuous { name: name.into(), short: short.into(), title: title.into(), value, colors }
+    let fixed = FIXED.into_iter().filter(|(quantity, ..)| cells.has(*quantity));
+    let fixed = fixed.map(|(quantity, short, title, colors, value)| Continuous {
+        name: quantity.name().into(),
+        short: short.into(),
+        title: title.into(),
+        value: Box::new(move |_, row| value(row)),
+        colors,
+    });
+    let measured = cells.numbers().into_iter().map(|number| measured(cells, number));
+    fixed.chain(measured).map(|continuous| continuous.layer(cells))
 }
 
 fn measured<'c>(cells: &'c Cells<'c>, number: Number) -> Continuous<'c> {

@@ -27,28 +27,12 @@ pub(crate) const COMMONEST: Color = [0xb4, 0xd0, 0xe8];
 pub(crate) const RARE: Color = [0x5a, 0x5a, 0x5a];
 pub(crate) const NOT_KNOWN: Color = [0xc4, 0xc4, 0xc4];
 
-/// Texts of a layer.
-struct Texts {
-    name: &'static str,
-    title: &'static str,
-}
+/// Names and explanations of the two layers.
+pub(crate) const WORDS: [&str; 2] = ["word", "cyclic sequence of flights"];
+pub(crate) const PATTERNS: [&str; 2] = ["pattern", "the word with each run of one flight counted once"];
 
-const WORDS: Texts = Texts { name: "word", title: "word: cyclic sequence of flights" };
-
-const PATTERNS: Texts =
-    Texts { name: "pattern", title: "pattern: the word with each run of one flight counted once" };
-
-/// Returns the layer of words.
-pub(crate) fn words(words: &WordIndex) -> Layer {
-    layer(words, &WORDS)
-}
-
-/// Returns the layer of patterns.
-pub(crate) fn patterns(patterns: &WordIndex) -> Layer {
-    layer(patterns, &PATTERNS)
-}
-
-fn layer(words: &WordIndex, texts: &Texts) -> Layer {
+/// Returns the layer of words or of patterns.
+pub(crate) fn layer(words: &WordIndex, [name, explanation]: [&'static str; 2]) -> Layer {
     let spellings = words.spellings();
     let index_of_word = |(number, spelling): (usize, &String)| match spelling.is_empty() {
         true => NO_EVENTS_INDEX,
@@ -66,11 +50,11 @@ fn layer(words: &WordIndex, texts: &Texts) -> Layer {
     palette.extend((1..COLORED_WORDS).map(distinct));
     palette.push(RARE);
     Layer {
-        name: texts.name.into(),
-        short: texts.name.into(),
-        title: texts.title.into(),
+        name: name.into(),
+        short: name.into(),
+        title: format!("{name}: {explanation}").into(),
         indices: words.numbers.iter().map(index).collect(),
-        entries: entries(words, texts, &spellings, |number| palette[usize::from(indices[number])]),
+        entries: entries(words, name, &spellings, |number| palette[usize::from(indices[number])]),
         palette,
         bar: None,
         numbers: None,
@@ -79,7 +63,7 @@ fn layer(words: &WordIndex, texts: &Texts) -> Layer {
 
 fn entries(
     words: &WordIndex,
-    texts: &Texts,
+    name: &str,
     spellings: &[String],
     color: impl Fn(usize) -> Color,
 ) -> Vec<NamedColor> {
@@ -100,7 +84,7 @@ fn entries(
     }
     list.extend(WITHOUT_WORD.map(|(without, color, text)| NamedColor {
         color,
-        text: if without == UNKNOWN { format!("{} {text}", texts.name) } else { text.to_owned() },
+        text: if without == UNKNOWN { format!("{name} {text}") } else { text.to_owned() },
         cells: words.numbers.iter().filter(|&&number| number == without).count(),
     }));
     legend(list)
@@ -119,7 +103,7 @@ mod tests {
             let word = |n: usize| (Spelling::Hashed { hash: n as u64, length: 70 }, count - n);
             let list: Vec<_> = (0..count).map(word).collect();
             let cells = list.iter().enumerate().flat_map(|(n, (_, cells))| vec![n as u32; *cells]);
-            let layer = words(&WordIndex { numbers: cells.collect(), list });
+            let layer = layer(&WordIndex { numbers: cells.collect(), list }, WORDS);
             let colors = layer.indices.iter().map(|index| layer.palette[usize::from(*index)]);
             let colors: Vec<Color> = colors.collect();
             let mut cell = 0;

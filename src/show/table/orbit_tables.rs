@@ -12,7 +12,7 @@ use crate::show::orbit_spectrum::Spectrum;
 use rattlemap_dynamics::machine::{Outputs, Situation, System};
 use rattlemap_dynamics::model::{DryFriction, Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::motion::{Slip, SlipKind, Slips};
-use rattlemap_dynamics::orbit::{Event, History, Sample, SlipPoint, is_reached};
+use rattlemap_dynamics::orbit::{Event, History, Orbit, Sample, SlipPoint, is_reached};
 
 /// A row of the motion: a sample, or the state before or after an event.
 #[derive(Clone, Debug)]
@@ -31,6 +31,18 @@ pub struct Moment {
     pub(crate) outputs: Outputs,
     /// The event, and `before` or `after`.
     event: Option<(EventRow, &'static str)>,
+}
+
+/// Returns the motion of an orbit as it was sampled from phase 0 on.
+pub(crate) fn sampled(orbit: &Orbit, samples: Vec<Sample>, samples_per_period: usize) -> History {
+    History {
+        meshing: orbit.strobe_meshing,
+        samples,
+        events: orbit.events.clone(),
+        slips: orbit.slips.clone(),
+        samples_per_period,
+        forcing_period: orbit.forcing_period,
+    }
 }
 
 /// Merges samples with the states before and after every event. A sample at the time of an event would repeat it.

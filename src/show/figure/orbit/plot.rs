@@ -58,20 +58,11 @@ impl<'a> OrbitPlot<'a> {
     /// [`ModelError`] if the model is not valid.
     pub fn new(model: &'a dyn Model, orbit: &Orbit, trace: &[Sample]) -> Result<OrbitPlot<'a>, ModelError> {
         let cycle = matches!(orbit.class, Class::Periodic { .. }).then_some(f64::from(orbit.cycle_periods));
-        let subtitle = heading::character(model, orbit);
-        let plot = OrbitPlot::of(model, (&orbit.events, trace), orbit.forcing_period, subtitle)?;
-        let slips = slips_within(&orbit.slips, trace, orbit.forcing_period);
         let turns = trace.last().map_or(1.0, |last| last.t / orbit.forcing_period);
-        let history = History {
-            meshing: orbit.strobe_meshing,
-            samples: trace.to_vec(),
-            events: orbit.events.clone(),
-            slips: orbit.slips.clone(),
-            samples_per_period: ((trace.len() as f64 - 1.0) / turns).round().max(1.0) as usize,
-            forcing_period: orbit.forcing_period,
-        };
-        let signals = signals(model, &history, orbit.forcing_period)?;
-        Ok(OrbitPlot { cycle, slips, signals, ..plot })
+        let samples_per_period = ((trace.len() as f64 - 1.0) / turns).round().max(1.0) as usize;
+        let history = orbit_tables::sampled(orbit, trace.to_vec(), samples_per_period);
+        let plot = OrbitPlot::of(model, &history, orbit.forcing_period, heading::character(model, orbit))?;
+        Ok(OrbitPlot { cycle, ..plot })
     }
 
     /// Prepares the figure of a motion from `start`. Its times are not divided by the forcing period.
@@ -83,19 +74,17 @@ impl<'a> OrbitPlot<'a> {
         start: &State,
         history: &History,
     ) -> Result<OrbitPlot<'a>, ModelError> {
-        let parts = (&history.events[..], &history.samples[..]);
-        let plot = OrbitPlot::of(model, parts, 1.0, heading::from_start(model, start))?;
-        let slips = slips_within(&history.slips, &history.samples, 1.0);
-        let signals = signals(model, history, 1.0)?;
-        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), slips, signals, ..plot })
+        let plot = OrbitPlot::of(model, history, 1.0, heading::from_start(model, start))?;
+        Ok(OrbitPlot { time: with_unit("time, t", plot.units.time.as_deref()), ..plot })
     }
 
     fn of(
         model: &'a dyn Model,
-        (events, trace): (&[Event], &[Sample]),
+        history: &History,
         unit_of_time: f64,
         subtitle: String,
     ) -> Result<OrbitPlot<'a>, ModelError> {
+        let History { samples: trace, events, slips, .. } = history;
         let oscillator = model.oscillator()?;
         let gaps = PlotGap::all(model, &oscillator);
         let contacts = contacts_at_start(&gaps, &oscillator, events, trace);
@@ -104,8 +93,8 @@ impl<'a> OrbitPlot<'a> {
             units: model.units(),
             bodies: model.bodies(),
             motion: DrawnMotion::new(events, trace, contacts, unit_of_time),
-            slips: Vec::new(),
-            signals: Vec::new(),
+            slips: slips_within(slips, trace, unit_of_time),
+            signals: signals(model, history, unit_of_time)?,
             oscillator,
             gaps,
             time: "time in forcing periods, t / T".to_owned(),
@@ -211,16 +200,13 @@ impl<'a> OrbitPlot<'a> {
         let mut entries = motion;
         for kind in self.motion.kinds() {
             let marker = Marker { radius: 7.0, ..self.marker(kind, DARK) };
-            entries.push(match kind {
-                EventKind::Impact if both => Entry::new(Key::MarkerPair(marker), "impact: before, after"),
-                EventKind::Impact => Entry::new(Key::Marker(marker), "impact"),
-                EventKind::MeshStart => {
-                    Entry::new(Key::Marker(marker), &format!("{} starts", self.contact_name()))
-                }
-                EventKind::MeshEnd => {
-                    Entry::new(Key::Marker(marker), &format!("{} ends", self.contact_name()))
-                }
-            });
+            let (key, text) = match kind {
+                EventKind::Impact if both => (Key::MarkerPair(marker), "impact: before, after".to_owned()),
+                EventKind::Impact => (Key::Marker(marker), "impact".to_owned()),
+                EventKind::MeshStart => (Key::Marker(marker), format!("{} starts", self.contact_name())),
+                EventKind::MeshEnd => (Key::Marker(marker), format!("{} ends", self.contact_name())),
+            };
+            entries.push(Entry::new(key, &text));
         }
         let names = ["sticking begins", "sticking ends", "sliding reverses"];
         for (kind, name) in SlipKind::ALL.into_iter().zip(names) {
