@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::{empty as folder, json, names, rattlemap, rows, run, says};
+use crate::common::{empty as folder, json, keys, names, printed, rattlemap, rows, run, says, stdout};
 
 const SMOKE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/smoke.toml");
 
@@ -16,12 +16,6 @@ fn assert_orbit_fields(orbit: &serde_json::Value) {
         assert_eq!(keys(event), "after before impulse kind side t t_mod_period");
     }
     assert_eq!(orbit["strobe"].as_array().map(Vec::len), Some(4));
-}
-
-fn keys(object: &serde_json::Value) -> String {
-    let mut keys: Vec<&str> = object.as_object().expect("an object").keys().map(String::as_str).collect();
-    keys.sort_unstable();
-    keys.join(" ")
 }
 
 /// Runs a changed smoke scene. Expects exit code 2, a message with all `parts`, nothing on stdout and no output folder.
@@ -207,9 +201,7 @@ fn completions_contain_every_command() {
 
 #[test]
 fn orbit_json_has_the_fields_of_the_contract() {
-    let run = run(&folder(), "orbit --json").success();
-    let printed = &run.get_output().stdout;
-    let orbit: serde_json::Value = serde_json::from_slice(printed).unwrap();
+    let orbit = printed(&folder(), "orbit --json");
     assert_orbit_fields(&orbit);
     assert_eq!(orbit["e"], 0.605);
     assert_eq!(orbit["omega"], 5.6);
@@ -249,8 +241,7 @@ fn an_orbit_without_a_word_says_why() {
             ["class                 periodic, period 1\n", "word                  none: no contact\n"],
         ),
     ] {
-        let run = run(&folder(), line).success();
-        let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+        let text = stdout(&folder(), line);
         assert!(parts.iter().all(|part| text.contains(part)), "{text}");
         assert!(!text.contains("P_{") && !text.contains("pattern"), "{text}");
     }
@@ -260,10 +251,8 @@ fn an_orbit_without_a_word_says_why() {
 #[test]
 fn a_long_table_of_events_leaves_the_summary_on_the_screen() {
     let line = "orbit --model shaking-table --set e=0.7 --set A=1.35";
-    let printed = |line: &str| run(&folder(), line).success().get_output().stdout.clone();
-    let orbit: serde_json::Value = serde_json::from_slice(&printed(&format!("{line} --json"))).unwrap();
-    let events = orbit["events"].as_array().unwrap().len();
-    let text = String::from_utf8(printed(line)).unwrap();
+    let events = printed(&folder(), &format!("{line} --json"))["events"].as_array().unwrap().len();
+    let text = stdout(&folder(), line);
     assert!(events > 100 && text.lines().count() < 45, "{events} events\n{text}");
     let hidden = format!("... {} more events; --json and --out list all of them\n", events - 16);
     assert!(text.contains(&hidden), "{text}");
@@ -271,16 +260,13 @@ fn a_long_table_of_events_leaves_the_summary_on_the_screen() {
 
 #[test]
 fn requested_periods_are_a_limit() {
-    let printed = |line: &str| run(&folder(), line).success().get_output().stdout.clone();
-    let object = printed("orbit --transient 1 --periods 2 --json");
-    let orbit: serde_json::Value = serde_json::from_slice(&object).unwrap();
+    let orbit = printed(&folder(), "orbit --transient 1 --periods 2 --json");
     // The transient, the alignment of a tangent vector, and the analysis.
     assert_eq!((&orbit["class"], &orbit["periods_run"]), (&"undecided".into(), &5.into()));
-    let text = String::from_utf8(printed("orbit --transient 1 --periods 2")).unwrap();
+    let text = stdout(&folder(), "orbit --transient 1 --periods 2");
     assert!(text.contains("undecided: neither periodic nor chaotic within 5 forcing periods\n"), "{text}");
     // Without a limit the analysis goes on.
-    let orbit: serde_json::Value = serde_json::from_slice(&printed("orbit --transient 1 --json")).unwrap();
-    assert_eq!(orbit["class"], "periodic");
+    assert_eq!(printed(&folder(), "orbit --transient 1 --json")["class"], "periodic");
 }
 
 /// The time counts from the start, not from the end of the transient.
@@ -357,8 +343,7 @@ fn check_columns(path: &Path) {
     assert_eq!((&*header, rows.len()), (columns, 5));
     for row in &rows {
         let set = format!("e={}", &row[0]);
-        let run = run(&folder(), &format!("orbit --json --set {set} --transient 200")).success();
-        let orbit: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+        let orbit = printed(&folder(), &format!("orbit --json --set {set} --transient 200"));
         let is_periodic = &row[1] == "periodic";
         assert_eq!(orbit["class"], *row[1]);
         assert_eq!(orbit["period"].as_u64(), row[2].parse().ok());
@@ -448,8 +433,7 @@ fn rows_of_orbit_have_at_most_120_characters() {
     for line in
         ["two-loose-gears", "two-loose-gears --from-start 2", "gear-pair", "absorber-chain --from-start 2"]
     {
-        let run = run(&folder(), &format!("orbit --model {line}")).success();
-        let text = String::from_utf8(run.get_output().stdout.clone()).unwrap();
+        let text = stdout(&folder(), &format!("orbit --model {line}"));
         assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
     }
 }

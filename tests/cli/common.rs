@@ -20,6 +20,23 @@ pub(crate) fn run(folder: &TempDir, line: &str) -> Assert {
     rattlemap(folder).args(line.split_whitespace()).assert()
 }
 
+/// What a command that succeeds prints.
+pub(crate) fn stdout(folder: &TempDir, line: &str) -> String {
+    String::from_utf8(run(folder, line).success().get_output().stdout.clone()).unwrap()
+}
+
+/// The object that a command prints.
+pub(crate) fn printed(folder: &TempDir, line: &str) -> serde_json::Value {
+    serde_json::from_str(&stdout(folder, line)).expect("one JSON object and nothing else")
+}
+
+/// The sorted names of an object's fields.
+pub(crate) fn keys(object: &serde_json::Value) -> String {
+    let mut keys: Vec<&str> = object.as_object().expect("an object").keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys.join(" ")
+}
+
 /// A new folder.
 pub(crate) fn empty() -> TempDir {
     tempfile::tempdir().unwrap()

@@ -13,16 +13,10 @@ use crate::common::{empty, json, rows, run, says, with_scene};
 
 /// A range in which period 4 ends, later on the way up than on the way down.
 const SCENE: &str = "title = 'Around a fold'
-[[axis]]
-parameter = 'omega'
-min = 5.5
-max = 5.7
-count = 12
-[[axis]]
-parameter = 'e'
-min = 0.915
-max = 0.937
-count = 12
+axis = [
+    { parameter = 'omega', min = 5.5, max = 5.7, count = 12 },
+    { parameter = 'e', min = 0.915, max = 0.937, count = 12 },
+]
 [outputs]
 quantities = ['class', 'lyapunov', 'symmetric', 'word', 'pattern']
 files = ['csv']
@@ -214,16 +208,10 @@ fn of_other_sources(out: &Path) {
 fn cycles_of_equal_period_differ_by_motion_and_quantities() {
     let folder = with_scene(
         "model = 'kahraman-singh'
-        [[axis]]
-        parameter = 'F_m'
-        min = 0.15
-        max = 0.17
-        count = 2
-        [[axis]]
-        parameter = 'omega'
-        min = 0.7
-        max = 1.0
-        count = 13
+        axis = [
+            { parameter = 'F_m', min = 0.15, max = 0.17, count = 2 },
+            { parameter = 'omega', min = 0.7, max = 1.0, count = 13 },
+        ]
         [outputs]
         quantities = ['class', 'pattern', 'amplitude']
         files = ['csv']

@@ -15,18 +15,10 @@ use tempfile::TempDir;
 
 /// A scene without exponents, whose shader Mesa compiles in half a second.
 pub(crate) const SCENE: &str = r#"
-[[axis]]
-parameter = "e"
-min = 0.0
-max = 1.0
-count = 24
-
-[[axis]]
-parameter = "omega"
-min = 4.0
-max = 12.0
-count = 24
-
+axis = [
+    { parameter = "e", min = 0.0, max = 1.0, count = 24 },
+    { parameter = "omega", min = 4.0, max = 12.0, count = 24 },
+]
 [outputs]
 quantities = ["impacts"]
 files = ["csv"]

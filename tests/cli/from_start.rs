@@ -3,10 +3,9 @@
 use std::f64::consts::PI;
 use std::fs;
 
-use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{empty, json, names, rattlemap, rows, run, says};
+use crate::common::{empty, json, names, printed, rattlemap, rows, run, says};
 
 const GRAVITY: f64 = 9.81;
 const RESTITUTION: f64 = 0.7;
@@ -41,8 +40,7 @@ fn numbers(row: &[String]) -> Vec<f64> {
 }
 
 fn state(folder: &TempDir, line: &str) -> Vec<f64> {
-    let run = run(folder, &format!("orbit --model ball.toml --from-start 1 --json {line}")).success();
-    let object: Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
+    let object = printed(folder, &format!("orbit --model ball.toml --from-start 1 --json {line}"));
     object["state"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
 }
 
@@ -118,10 +116,8 @@ fn the_state_at_the_time_of_an_impact_is_the_one_after_it() {
 #[test]
 fn a_window_of_later_periods_is_a_part_of_the_whole() {
     let folder = empty();
-    let orbit = |arguments: &str| -> Value {
-        let line = format!("orbit --set e=0.06 --start 0.1,0,-0.2,1.5 --json {arguments}");
-        serde_json::from_slice(&run(&folder, &line).success().get_output().stdout).unwrap()
-    };
+    let line = "orbit --set e=0.06 --start 0.1,0,-0.2,1.5 --json";
+    let orbit = |arguments: &str| printed(&folder, &format!("{line} {arguments}"));
     let (whole, last) =
         (orbit("--from-start 12 --out whole"), orbit("--from-start 4 --to-period 12 --out last"));
     let [all, some] = [&whole, &last].map(|object| object["events"].as_array().unwrap());
@@ -165,8 +161,8 @@ fn reversals_and_sticking_are_events() {
         [[friction]]\nforce = 1\n";
     fs::write(folder.path().join("pad.toml"), model).unwrap();
     let line = "orbit --model pad.toml --start=0.00085,0 --from-start 3";
-    let printed = run(&folder, &format!("{line} --out o --format svg")).success();
-    printed.stdout(says(&["reversal  friction", "stick     friction"]));
+    let orbit = run(&folder, &format!("{line} --out o --format svg")).success();
+    orbit.stdout(says(&["reversal  friction", "stick     friction"]));
     let (header, events) = rows(&folder.path().join("o/events.csv"));
     assert_eq!(header, "kind,side,t,t_mod_period,before_r,before_v,after_r,after_v,impulse,element");
     let kinds: Vec<[&str; 3]> = events.iter().map(|row| [&*row[0], &*row[1], &*row[9]]).collect();
@@ -183,8 +179,7 @@ fn reversals_and_sticking_are_events() {
     assert_eq!(sticks.len(), 2, "before and after");
     let figure = fs::read_to_string(folder.path().join("o/history.svg")).unwrap();
     assert!(["sticking begins", "sliding reverses"].iter().all(|text| figure.contains(text)));
-    let object = run(&folder, "orbit --model friction-oscillator --json").success();
-    let object: Value = serde_json::from_slice(&object.get_output().stdout).unwrap();
+    let object = printed(&folder, "orbit --model friction-oscillator --json");
     let kinds: Vec<_> =
         object["events"].as_array().unwrap().iter().map(|event| event["kind"].clone()).collect();
     assert_eq!(kinds, ["stick", "slip", "stick", "slip"]);

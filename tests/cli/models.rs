@@ -4,10 +4,9 @@ use std::fs;
 
 use rattlemap::model::{GearPair, Model};
 use rattlemap::model_file::{BUILT_IN, FileModel};
-use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{empty, json, rattlemap, run};
+use crate::common::{empty, json, printed, rattlemap, run};
 
 const TEXT: &str = include_str!("../../docs/models.md");
 
@@ -146,8 +145,7 @@ fn units_and_significant_digits_are_printed() {
     let expected =
         "kind|side|t [s]|t mod T [s]|impulse|z [m] before|v [m/s] before|z [m] after|v [m/s] after";
     assert_eq!(heads.join("|"), expected);
-    let found: Value =
-        serde_json::from_str(&stdout(&folder, "orbit --model ball.toml --start 0.001,0 --json")).unwrap();
+    let found = printed(&folder, "orbit --model ball.toml --start 0.001,0 --json");
     let units = &found["units"];
     let listed: Vec<&str> =
         ["m", "f", "z", "v", "gap", "gap_rate", "t"].map(|name| units[name].as_str().unwrap()).into();
@@ -212,9 +210,7 @@ fn a_model_from_a_file_has_maps_basins_diagrams_and_orbits() {
     );
     assert!(csv.contains(",1,mesh_start,") && !csv.contains(",impact,"), "{csv}");
 
-    let orbit =
-        run(&folder, "orbit --model my-bilinear.toml --set omega=0.8 --json --out out/motion").code(0);
-    let orbit: Value = serde_json::from_slice(&orbit.get_output().stdout).unwrap();
+    let orbit = printed(&folder, "orbit --model my-bilinear.toml --set omega=0.8 --json --out out/motion");
     assert_eq!(orbit["omega"], 0.8);
     assert!(orbit.get("e").is_none());
     assert_eq!(orbit["strobe"].as_array().unwrap().len(), 2);
@@ -245,9 +241,7 @@ fn an_unforced_motion_does_not_depend_on_the_frequency() {
     for frequency in ["1", "0.3", "7.0", "2*pi"] {
         let text = toml(5).replace("motion.frequency = 1", &format!("motion.frequency = \"{frequency}\""));
         fs::write(folder.path().join("ball.toml"), text).unwrap();
-        let orbit: Value =
-            serde_json::from_str(&stdout(&folder, "orbit --model ball.toml --start 1,0 --time 1 --json"))
-                .unwrap();
+        let orbit = printed(&folder, "orbit --model ball.toml --start 1,0 --time 1 --json");
         let off = |i: usize, exact: f64| (orbit["state"][i].as_f64().unwrap() - exact).abs();
         assert!(off(0, 0.2250597607) < 1e-10 && off(1, -2.2799402393) < 1e-10, "{frequency}: {orbit}");
         assert_eq!(
@@ -271,7 +265,7 @@ fn harmonics_and_stages_are_printed_and_computed() {
     ] {
         assert!(page.contains(part), "{part} is not in\n{page}");
     }
-    let orbit: Value = serde_json::from_str(&stdout(&folder, "orbit --model my-gear.toml --json")).unwrap();
+    let orbit = printed(&folder, "orbit --model my-gear.toml --json");
     assert_eq!(orbit["class"], "periodic", "{orbit}");
 }
 

@@ -107,16 +107,10 @@ fn compare(shape: Shape, seeds: u64, least: [u64; 2]) {
 /// Cells with gears at rest, two periods, and chaos.
 const SCENE: &str = r#"
 model = "two-loose-gears"
-[[axis]]
-parameter = "omega"
-min = 80.0
-max = 400.0
-count = 4
-[[axis]]
-parameter = "A"
-min = 1e-5
-max = 8e-4
-count = 3
+axis = [
+    { parameter = "omega", min = 80.0, max = 400.0, count = 4 },
+    { parameter = "A", min = 1e-5, max = 8e-4, count = 3 },
+]
 "#;
 
 #[test]
@@ -163,12 +157,10 @@ restitution = "0.8 - 0.05*speed"
 
 const SCENE_OF_MIRRORED: &str = r#"
 model = "mirrored.toml"
-[[axis]]
-parameter = "F"
-values = [1.0, 2.0]
-[[axis]]
-parameter = "omega"
-values = [1.4, 1.7, 2.0, 2.3, 2.6, 4.0]
+axis = [
+    { parameter = "F", values = [1.0, 2.0] },
+    { parameter = "omega", values = [1.4, 1.7, 2.0, 2.3, 2.6, 4.0] },
+]
 "#;
 
 /// The processor measures the motion in which lanes end.

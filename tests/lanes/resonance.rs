@@ -15,16 +15,10 @@ use rattlemap_dynamics::orbit::{Class, Status};
 
 /// 25 walls, 11 coefficients of restitution.
 const SCENE: &str = "model = 'resonance.toml'
-[[axis]]
-parameter = 'at'
-min = -0.2
-max = 1.0
-count = 25
-[[axis]]
-parameter = 'e'
-min = 0.3
-max = 0.8
-count = 11
+axis = [
+    { parameter = 'at', min = -0.2, max = 1.0, count = 25 },
+    { parameter = 'e', min = 0.3, max = 0.8, count = 11 },
+]
 [outputs]
 quantities = ['class', 'lyapunov', 'impacts', 'word', 'harmonic']
 ";

@@ -14,18 +14,12 @@ use rattlemap::map::scene::{Purpose, Scene};
 use rattlemap::record::Record;
 
 const SCENE: &str = "
+axis = [
+    { parameter = 'e', min = 0.02, max = 0.93, count = 8 },
+    { parameter = 'omega', min = 1.1, max = 10.9, count = 8 },
+]
 [outputs]
 quantities = ['class', 'lyapunov', 'impacts', 'mesh', 'symmetric', 'word', 'pattern']
-[[axis]]
-parameter = 'e'
-min = 0.02
-max = 0.93
-count = 8
-[[axis]]
-parameter = 'omega'
-min = 1.1
-max = 10.9
-count = 8
 ";
 
 fn table(precision: Precision) -> PathBuf {

@@ -11,16 +11,10 @@ use rattlemap::record::{Record, valid};
 use rattlemap_dynamics::orbit::Class;
 
 /// A window of the main map with bands of cycles with different numbers of impacts.
-const SCENE: &str = "[[axis]]
-parameter = 'e'
-min = 0.2
-max = 0.5
-count = 65
-[[axis]]
-parameter = 'omega'
-min = 3.0
-max = 8.0
-count = 65
+const SCENE: &str = "axis = [
+    { parameter = 'e', min = 0.2, max = 0.5, count = 65 },
+    { parameter = 'omega', min = 3.0, max = 8.0, count = 65 },
+]
 [outputs]
 quantities = ['class', 'lyapunov', 'impacts', 'mesh']
 ";

@@ -24,18 +24,10 @@ use rattlemap_dynamics::orbit::{Class, Status, analyse};
 
 /// A map over frequency and restitution; restitution increases through a range in which periods 2 and 3 coexist.
 const SCENE: &str = r#"title = "Hysteresis"
-
-[[axis]]
-parameter = "omega"
-min = 5.6
-max = 5.61
-count = 2
-
-[[axis]]
-parameter = "e"
-min = 0.9
-max = 0.94
-count = 41
+axis = [
+    { parameter = "omega", min = 5.6, max = 5.61, count = 2 },
+    { parameter = "e", min = 0.9, max = 0.94, count = 41 },
+]
 
 [start]
 policy = "up"

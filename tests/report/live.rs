@@ -11,36 +11,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::report::page::{WITHOUT_GRAPHICS, between, chromium, hashed, skipped, unbroken, visit};
-
-/// Functions for scripts that wait for workers. The browser's virtual time does not wait for them, so each step takes some
-/// real time.
-const WAITING: &str = r##"
-const said = {};
-const text = (id) => document.getElementById(id).textContent;
-const until = (ready) => new Promise((resolve) => {
-  const look = () => {
-    for (let n = 0, sum = 0; n < 5e6; n++) sum += Math.sqrt(n);
-    if (ready()) resolve();
-    else setTimeout(look, 20);
-  };
-  look();
-});
-const isComputed = () => live?.isWhole && live.columns >= 65 && covers(live.made, view);
-function sayWindow() {
-  said.scene = text("scene");
-  said.counts = [live.columns, live.rows];
-  said.classes = [...live.values.class].map((index) => map.classes[index]);
-  said.periods = [...live.values.period];
-}
-const motion = () => until(() => !document.getElementById("motion").hidden && !text("computing").includes("computing"));
-function finish() {
-  const result = document.createElement("pre");
-  result.id = "said";
-  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
-  document.body.append(result);
-}
-"##;
+use crate::report::page::{WITHOUT_GRAPHICS, chromium, skipped, unbroken, visit, with_script};
 
 /// Zooms to a pitchfork, clicks on both sides of it, moves the slider of F, and opens the link to what is shown.
 const WALK: &str = r##"
@@ -91,7 +62,6 @@ walk().catch((error) => { said.error = String(error.stack); finish(); });
 
 /// Keeps records of a finer picture back, looks at a cell without a record, and lets the records arrive.
 const PARTIAL: &str = r##"
-const fact = (name) => [...document.querySelectorAll("#readout tr")].find((row) => row.cells[0].textContent === name).cells[1].textContent;
 const lines = () => ["\u03c9", "class", "exponent", "periods run"].map(fact);
 async function partial() {
   await until(() => !document.getElementById("wait"));
@@ -231,17 +201,6 @@ records().catch((error) => { said.error = String(error.stack); finish(); });
 /// Flags of a browser that offers a device without hardware.
 const SOFTWARE_DEVICE: [&str; 2] = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"];
 
-/// Writes a copy of a page with a script, whose hash the copy's policy allows. Returns its path.
-fn with_script(page: &Path, script: &str) -> PathBuf {
-    let text = fs::read_to_string(page).unwrap();
-    let whole = format!("<script>{WAITING}{script}</script></body>");
-    let own = between(&whole, "<script>", "</script>");
-    let text = text.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
-    let copy = page.with_extension("visited.html");
-    fs::write(&copy, text.replacen("</body>", &whole, 1)).unwrap();
-    copy
-}
-
 /// Returns what a script collects in a page.
 fn visited(browser: &str, page: &Path, script: &str, query: &str, flags: &[&str]) -> Value {
     let said = visit(browser, &with_script(page, script), query, flags, 400_000);
@@ -360,12 +319,8 @@ fn cells_without_a_record_are_pale_and_show_no_numbers_until_it_arrives() {
         }
     }
     let [live, button] = [0, 1].map(|k| said["paused"][k].as_str().unwrap());
-    assert!(
-        live.starts_with("stopped: ")
-            && live.ends_with(" cells of this picture are left")
-            && button == "Continue",
-        "{said}"
-    );
+    assert!(live.starts_with("stopped: ") && live.ends_with(" cells of this picture are left"), "{said}");
+    assert_eq!(button, "Continue");
     let (renewed, class) = (&said["renewed"], said["labels"][0].as_str().unwrap());
     assert_eq!(renewed[0], said["selected"][0], "the selection moved: {said}");
     let period = format!("period {}", said["labels"][1]);
@@ -416,19 +371,10 @@ fn records_of_the_page_have_the_bits_of_a_program_without_fma() {
         let folder = tempfile::tempdir().unwrap();
         let said = visited(browser, &explored(&folder, &[scene]), RECORDS, "", &WITHOUT_GRAPHICS);
         let page = STANDARD.decode(said["records"].as_str().unwrap()).unwrap();
-        let example = [
-            "run",
-            "--quiet",
-            "--package",
-            "rattlemap-web",
-            "--example",
-            "records",
-            "--target-dir",
-            "target/no-fma",
-        ];
+        let example = "run --quiet --package rattlemap-web --example records --target-dir target/no-fma";
         let program = Command::new(env!("CARGO"))
             .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .args(example)
+            .args(example.split(' '))
             .env("RUSTFLAGS", "")
             .write_stdin(said["scene"].as_str().unwrap())
             .timeout(Duration::from_secs(900))

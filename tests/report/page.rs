@@ -25,21 +25,13 @@ const CELL: [usize; 2] = [6, 8];
 const LAYERS: [&str; 6] = ["period and chaos", "exponent", "impacts", "meshing", "pattern", "word"];
 
 const SCENE: &str = r#"title = "Evil </script><b>title</b> & more"
+axis = [
+    { parameter = "e", min = 0.0, max = 1.0, count = 24 },
+    { parameter = "omega", min = 2.0, max = 11.0, count = 19 },
+]
 
 [parameters]
 F = 45.0
-
-[[axis]]
-parameter = "e"
-min = 0.0
-max = 1.0
-count = 24
-
-[[axis]]
-parameter = "omega"
-min = 2.0
-max = 11.0
-count = 19
 
 [start]
 policy = "state"
@@ -50,19 +42,46 @@ quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "patt
 files = ["csv", "html"]
 "#;
 
-/// A script that uses the page like a reader and collects the texts that it shows.
-const VISIT: &str = r##"<script>
+/// Functions for scripts that wait for workers. The browser's virtual time does not wait for them, so each step takes some
+/// real time.
+const WAITING: &str = r##"
 const said = {};
 const text = (id) => document.getElementById(id).textContent;
 const fact = (name) => [...document.querySelectorAll("#readout tr")]
   .find((row) => row.cells[0].textContent === name)?.cells[1].textContent;
+const until = (ready) => new Promise((resolve) => {
+  const look = () => {
+    for (let n = 0, sum = 0; n < 5e6; n++) sum += Math.sqrt(n);
+    if (ready()) resolve();
+    else setTimeout(look, 20);
+  };
+  look();
+});
+const isComputed = () => live?.isWhole && live.columns >= 65 && covers(live.made, view);
+function sayWindow() {
+  said.scene = text("scene");
+  said.counts = [live.columns, live.rows];
+  said.classes = [...live.values.class].map((index) => map.classes[index]);
+  said.periods = [...live.values.period];
+}
+const motion = () => until(() => !document.getElementById("motion").hidden && !text("computing").includes("computing"));
+function finish() {
+  const result = document.createElement("pre");
+  result.id = "said";
+  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
+  document.body.append(result);
+}
+"##;
+
+/// A script that uses the page like a reader and collects the texts that it shows.
+const VISIT: &str = r##"
 function point(type, x, y) {
   const at = canvas.getBoundingClientRect();
   canvas.dispatchEvent(new PointerEvent(type, { pointerId: 1, clientX: at.left + x, clientY: at.top + y, bubbles: true }));
 }
 canvas.setPointerCapture = () => {};
-function visit() {
-  if (document.getElementById("wait")) return setTimeout(visit, 20);
+async function visit() {
+  await until(() => !document.getElementById("wait"));
   said.title = text("title");
   said.layers = [...document.querySelectorAll("#layers button")].map((button) => button.textContent);
   const [x, y] = pixel(6.5, 8.5);
@@ -71,21 +90,12 @@ function visit() {
   point("pointerdown", x, y);
   point("pointerup", x, y);
   said.command = text("command");
-  settled(() => browse(x, y));
-}
-// Continues when the motion of the selected cell is there. The browser's virtual time does not wait for workers, so each
-// step takes some real time.
-function settled(next) {
-  for (let n = 0, sum = 0; n < 5e6; n++) sum += Math.sqrt(n);
-  if (text("computing").includes("computing")) return setTimeout(() => settled(next), 20);
+  await until(() => !text("computing").includes("computing"));
   said.motion = text("computing");
   said.summary = text("summary");
   said.figures = ["gap", "phase_plane", "time_history"].map((id) => document.getElementById(id).naturalWidth > 100);
-  next();
-}
-function browse(x, y) {
-  canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -600, clientX: canvas.getBoundingClientRect().left + x,
-    clientY: canvas.getBoundingClientRect().top + y, cancelable: true }));
+  const { left, top } = canvas.getBoundingClientRect();
+  canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -600, clientX: left + x, clientY: top + y, cancelable: true }));
   said.zoomed = view.width < 12 && view.left > 0;
   point("pointermove", x, y);
   said.stays = fact("cell");
@@ -102,13 +112,10 @@ function browse(x, y) {
   said.all = view.width === columns && view.left === 0;
   const drawn = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
   said.colors = new Set(new Uint32Array(drawn.buffer)).size;
-  const result = document.createElement("pre");
-  result.id = "said";
-  result.textContent = btoa(unescape(encodeURIComponent(JSON.stringify(said))));
-  document.body.append(result);
+  finish();
 }
-visit();
-</script></body>"##;
+visit().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
 
 pub(crate) fn chromium() -> Option<&'static str> {
     ["chromium", "chromium-browser", "google-chrome"].into_iter().find(|name| {
@@ -219,15 +226,21 @@ impl Report {
             skipped();
             return None;
         };
-        let visited = self.file("visited.html");
-        let visit_and_read = VISIT.replacen("const result", &format!("{also} const result"), 1);
-        let page = self.page().replace("</body>", &visit_and_read);
-        // The security policy must allow the test's own script.
-        let own = between(&visit_and_read, "<script>", "</script>");
-        let page = page.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
-        fs::write(&visited, page).unwrap();
+        let script = VISIT.replacen("finish();", &format!("{also} finish();"), 1);
+        let visited = with_script(&self.file("report.html"), &script);
         Some(visit(browser, &visited, "", &WITHOUT_GRAPHICS, 10_000))
     }
+}
+
+/// Writes a copy of a page with a script, whose hash the copy's policy allows. Returns its path.
+pub(crate) fn with_script(page: &Path, script: &str) -> PathBuf {
+    let text = fs::read_to_string(page).unwrap();
+    let whole = format!("<script>{WAITING}{script}</script></body>");
+    let own = between(&whole, "<script>", "</script>");
+    let text = text.replacen("script-src ", &format!("script-src {} ", hashed(own)), 1);
+    let copy = page.with_extension("visited.html");
+    fs::write(&copy, text.replacen("</body>", &whole, 1)).unwrap();
+    copy
 }
 
 /// Returns the text between the first occurrences of two marks.

@@ -13,18 +13,10 @@ use rattlemap::record::{Record, valid};
 use rattlemap::store::record_file::{RECORDS, RecordFile};
 use rattlemap::validate::{Difference, Subject};
 
-const SCENE: &str = r#"[[axis]]
-parameter = "e"
-min = 0.3
-max = 0.9
-count = 6
-
-[[axis]]
-parameter = "omega"
-min = 2.0
-max = 6.0
-count = 6
-
+const SCENE: &str = r#"axis = [
+    { parameter = "e", min = 0.3, max = 0.9, count = 6 },
+    { parameter = "omega", min = 2.0, max = 6.0, count = 6 },
+]
 [integration]
 transient_periods = 120
 

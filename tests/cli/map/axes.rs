@@ -2,22 +2,15 @@
 
 use super::*;
 
-const COUPLED: &str = r#"[parameters]
+const COUPLED: &str = r#"axis = [
+    { parameter = "k1", min = 10.0, max = 90.0, count = 4, scale = "log" },
+    { parameter = "F", values = [3.0, 12.5, 40.0] },
+]
+[parameters]
 e = 0.3
 
 [derived]
 k2 = "2/3*k1"
-
-[[axis]]
-parameter = "k1"
-min = 10.0
-max = 90.0
-count = 4
-scale = "log"
-
-[[axis]]
-parameter = "F"
-values = [3.0, 12.5, 40.0]
 
 [outputs]
 quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word"]

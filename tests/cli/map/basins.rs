@@ -5,21 +5,13 @@ use rattlemap::store::record_file::{Identity, RecordFile};
 use super::*;
 
 /// Attractors without contact and with rattling; most cells are filled.
-const BASIN: &str = r#"[parameters]
+const BASIN: &str = r#"axis = [
+    { start = "x1", min = -0.6, max = 0.4, count = 65 },
+    { start = "v1", min = -2.0, max = 2.0, count = 49 },
+]
+[parameters]
 e = 0.98
 omega = 9.2
-
-[[axis]]
-start = "x1"
-min = -0.6
-max = 0.4
-count = 65
-
-[[axis]]
-start = "v1"
-min = -2.0
-max = 2.0
-count = 49
 
 [start]
 policy = "state"

@@ -1,7 +1,6 @@
 //! Engines write the same files, and `auto` chooses one.
 
 use super::*;
-use crate::common::with_scene;
 
 #[test]
 fn lanes_give_the_same_files_and_classes() {
@@ -132,7 +131,7 @@ fn an_environment_that_leaves_no_adapter_is_named() {
 /// Software drivers serve as graphics device here.
 #[test]
 fn graphics_devices_refuse_a_negative_preload_and_name_the_processor() {
-    let folder = with_scene(
+    let folder = with(
         "model = 'm.toml'\n[[axis]]\nparameter = 'T'\nvalues = [100.0, 200.0]\n[[axis]]\nparameter = 'omega'\nvalues = [5.0, 8.0]\n",
     );
     let backlash = include_str!("../../../models/backlash.toml");

@@ -1,12 +1,7 @@
 //! `map --json`: one object on stdout. Scripts depend on its fields.
 
 use super::*;
-
-fn keys(object: &serde_json::Value) -> String {
-    let mut keys: Vec<&str> = object.as_object().expect("an object").keys().map(String::as_str).collect();
-    keys.sort_unstable();
-    keys.join(" ")
-}
+use crate::common::keys;
 
 #[test]
 fn json_describes_a_map() {

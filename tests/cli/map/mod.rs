@@ -28,21 +28,13 @@ use predicates::prelude::*;
 use rattlemap_dynamics::word::Word;
 use tempfile::TempDir;
 
-use crate::common::{rattlemap, rows, says};
+use crate::common::{json, printed, rattlemap, rows, says, with_scene as with};
 
 const SCENE: &str = r#"title = "A <small> map"
-
-[[axis]]
-parameter = "e"
-min = 0.0
-max = 1.0
-count = 20
-
-[[axis]]
-parameter = "omega"
-min = 1.0
-max = 12.0
-count = 16
+axis = [
+    { parameter = "e", min = 0.0, max = 1.0, count = 20 },
+    { parameter = "omega", min = 1.0, max = 12.0, count = 16 },
+]
 
 [outputs]
 quantities = ["class", "lyapunov", "impacts", "mesh", "symmetric", "word", "pattern"]
@@ -60,13 +52,6 @@ const SAME: &str = "cells.csv cells.npy words.csv map.png lyapunov.png impacts.p
 
 fn folder() -> TempDir {
     with(SCENE)
-}
-
-/// A folder with a scene `s.toml`.
-fn with(scene: &str) -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("s.toml"), scene).unwrap();
-    folder
 }
 
 /// The words of a line of arguments.
@@ -96,12 +81,6 @@ fn fails(folder: &TempDir, arguments: &str, code: i32, parts: &[&str]) {
     command(folder, arguments).assert().code(code).stdout("").stderr(says(parts));
 }
 
-/// Runs a command and returns the object that it prints.
-fn printed(folder: &TempDir, arguments: &str) -> serde_json::Value {
-    let run = succeeds(folder, arguments);
-    serde_json::from_slice(&run.get_output().stdout).expect("one JSON object and nothing else")
-}
-
 /// Starts the program in a folder.
 fn begin(folder: &TempDir, arguments: &str) -> std::process::Child {
     let mut run = Process::new(assert_cmd::cargo::cargo_bin("rattlemap"));
@@ -124,10 +103,6 @@ fn wait_until(holds: impl Fn() -> bool) {
         assert!(clock.elapsed().as_secs() < 60, "the condition does not hold after a minute");
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
-}
-
-fn json(path: &Path) -> serde_json::Value {
-    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
 }
 
 /// Flips a bit of the byte that lies `from_end` bytes before the end of a file.

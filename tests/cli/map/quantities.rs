@@ -1,7 +1,6 @@
 //! Measured quantities of a map: columns, figures, audits, and records that are stored, merged and read again.
 
 use super::*;
-use crate::common::{run, with_scene};
 
 const ALL: &str = "impact_speed impact_speed_max impact_energy impact_rate contact_force_max contact_force_rms amplitude rms harmonic \
                    dissipated multiplier stick_fraction friction_energy release_energy state";
@@ -13,7 +12,7 @@ fn measured(model: &str, axes: [(&str, f64, f64); 2], counts: [usize; 2], more: 
     };
     let axes: String = axes.into_iter().zip(counts).map(axis).collect();
     let list: String = ALL.split_whitespace().map(|name| format!("'{name}', ")).collect();
-    with_scene(&format!("model = '{model}'\n{axes}[outputs]\nquantities = ['class', {list}]\n{more}"))
+    with(&format!("model = '{model}'\n{axes}[outputs]\nquantities = ['class', {list}]\n{more}"))
 }
 
 const GEARS: [(&str, f64, f64); 2] = [("e", 0.1, 0.9), ("omega", 2.0, 10.0)];
@@ -78,8 +77,7 @@ fn shards_and_records_keep_measured_quantities() {
 fn numbers_of_a_map_are_those_of_its_orbits() {
     let folder = measured("gear-pair", GEARS, [2, 2], "");
     succeeds(&folder, "map s.toml --engine cpu --quiet");
-    let output = run(&folder, "orbit --set e=0.1 --set omega=2.0 --json").code(0).get_output().stdout.clone();
-    let orbit: serde_json::Value = serde_json::from_slice(&output).unwrap();
+    let orbit = printed(&folder, "orbit --set e=0.1 --set omega=2.0 --json");
     let csv = folder.path().join("out/s/cells.csv");
     let numbers = orbit["quantities"].as_object().unwrap();
     assert_eq!(orbit["class"], "periodic");

@@ -13,17 +13,10 @@ use tempfile::TempDir;
 use crate::common::rattlemap;
 
 const SCENE: &str = r#"
-[[axis]]
-parameter = "e"
-min = 0.1
-max = 0.9
-count = 12
-
-[[axis]]
-parameter = "omega"
-min = 4.0
-max = 7.0
-count = 8
+axis = [
+    { parameter = "e", min = 0.1, max = 0.9, count = 12 },
+    { parameter = "omega", min = 4.0, max = 7.0, count = 8 },
+]
 "#;
 
 const SHARDS: usize = 2;
