@@ -666,13 +666,9 @@ constant = "k" | constant = "1/0" | `signal.0.name = "seat"` does not fit: at th
 "#,
     );
     let rows = SIGNAL.lines().filter(|line| !line.contains('[') || line.contains("[[")).collect::<Vec<_>>();
-    let error =
-        FileModel::parse(&(TWO_DEGREES.to_owned() + &rows.join("\n")), "m.toml").unwrap_err().to_string();
-    assert!(error.contains("`signal.0.displacement` is missing"), "{error}");
-    let five = TWO_DEGREES.to_owned()
-        + &(0..5).map(|i| SIGNAL.replace("seat", &format!("s{i}"))).collect::<String>();
-    let error = FileModel::parse(&five, "m.toml").unwrap_err().to_string();
-    assert!(error.contains("at most 4 tables, [[signal]]"), "{error}");
+    check_refusal(&(TWO_DEGREES.to_owned() + &rows.join("\n")), "`signal.0.displacement` is missing");
+    let five: String = (0..5).map(|i| SIGNAL.replace("seat", &format!("s{i}"))).collect();
+    check_refusal(&(TWO_DEGREES.to_owned() + &five), "at most 4 tables, [[signal]]");
 }
 
 /// Friction for a model of two degrees of freedom.
