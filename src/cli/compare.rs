@@ -116,10 +116,7 @@ fn other_differences(comparison: &Comparison, scene: &Scene) -> Vec<String> {
     };
     let exponents = comparison.exponent.map(|largest| {
         let place = scene.points().named(largest.id);
-        format!(
-            "exponents of {} by at most {:.1e}, at {place}",
-            comparison.exponents, largest.difference
-        )
+        format!("exponents of {} by at most {:.1e}, at {place}", comparison.exponents, largest.difference)
     });
     let parts = [
         tally("in symmetry", comparison.symmetric),
