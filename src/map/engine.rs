@@ -196,7 +196,7 @@ impl Engine<'_> {
     }
 
     /// Computes until some cells have ended, if possible until at most `until` are left. Returns the ids and records of
-    /// those that have ended; empty if no cell is under way or the flag of [`Engine::stop_on`] is raised.
+    /// those that have ended; empty if no cell is under way or the flag of `stop_on` is raised.
     ///
     /// # Errors
     /// [`EngineError`], after which no cell is under way.
