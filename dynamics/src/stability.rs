@@ -206,9 +206,20 @@ pub struct Cycle {
     pub log_radius: f64,
     /// Whether an event is so near to grazing that the multipliers are not reliable.
     pub near_grazing: bool,
+    /// Image of the state under the map whose fixed point the search has found.
+    pub(crate) image: State,
+    /// Whether the error of the state does not tell the period from a divisor of it, as at a flip.
+    pub(crate) may_be_shorter: bool,
 }
 
 impl Cycle {
+    /// Returns the error of the state as a multiple of the error `residual` of its image and of the rounding errors over a cycle.
+    pub(crate) fn error(&self, residual: f64) -> f64 {
+        let from_one = |[re, im]: &[f64; 2]| (re - 1.0).hypot(*im);
+        let least = self.multipliers.iter().map(from_one).fold(f64::INFINITY, f64::min);
+        (residual + 4.0 * f64::EPSILON * norm(&self.monodromy).max(1.0)) / least
+    }
+
     /// Returns the modulus of the largest multiplier. Below 1 the orbit is stable.
     pub fn spectral_radius(&self) -> f64 {
         self.log_radius.exp()

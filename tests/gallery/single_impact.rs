@@ -19,6 +19,7 @@ use crate::gallery::cycle::{eigenvalues, first_block, followed, multipliers_apar
 use rattlemap_dynamics::model::{NonImpacting, State, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{EventKind, Trajectory};
+use rattlemap_dynamics::orbit::{Class, Settings, Status, analyse_flow};
 
 /// A forced oscillator with one stop.
 #[derive(Clone, Copy, Debug)]
@@ -149,6 +150,58 @@ fn the_orbit_agrees_with_the_coco_demo() {
     trajectory.advance_to(std::f64::consts::PI, &mut ()).unwrap();
     let [x, v, ..] = trajectory.state();
     assert!((x + 0.98).abs() < 0.005 && (v + 0.29).abs() < 0.005, "({x}, {v})");
+}
+
+/// Beside a flip the multiplier is almost -1, so that a computed cycle has a large error. It must not be taken for one of twice the period.
+#[test]
+fn motion_beside_a_flip_has_the_period_of_its_cycle() {
+    // Periods, frequency, and about the force at which the closed form has a multiplier of -1.
+    let rows = [
+        (1, 0.95, 0.5356),
+        (1, 1.1, 4.2446),
+        (1, 1.15, 6.0876),
+        (2, 2.2, 1.8438),
+        (2, 2.3, 1.7682),
+        (2, 2.4, 1.8884),
+    ];
+    let far = [(2, 2.5, 2.1364), (2, 2.6, 2.5183), (2, 2.8, 3.9089), (2, 3.0, 7.3539), (2, 3.2, 22.014)];
+    let (mut cells, mut uncertain) = (0, 0);
+    for (n, omega, near) in rows.into_iter().chain(far) {
+        let cycle = |force: f64| Stop { force, omega, ..COCO }.orbits(n)[0];
+        let above_minus_one = |force| eigenvalues(cycle(force).monodromy).iter().all(|mu| mu.re > -1.0);
+        let [mut stable, mut unstable] = [0.999 * near, 1.001 * near];
+        if above_minus_one(unstable) {
+            std::mem::swap(&mut stable, &mut unstable);
+        }
+        assert!(above_minus_one(stable) && !above_minus_one(unstable), "{omega}");
+        let side = (stable - near).signum();
+        for _ in 0..60 {
+            let middle = 0.5 * (stable + unstable);
+            if above_minus_one(middle) { stable = middle } else { unstable = middle }
+        }
+        let start = cycle(stable).strobe;
+        for share in [1e-4, 1e-6, 3e-7, 1e-7, 1e-8] {
+            let force = stable * (1.0 + side * share);
+            let (oscillator, law) = Stop { force, omega, ..COCO }.walled().oscillator();
+            let orbit = analyse_flow(&Flow::new(&oscillator), law, start, &Settings::default(), 8);
+            cells += 1;
+            if orbit.class == (Class::Periodic { period: n }) {
+                let found = orbit.floquet.unwrap()[0][0];
+                let exact = eigenvalues(cycle(force).monodromy).iter().map(|mu| mu.re).fold(0.0, f64::min);
+                assert!((found - exact).abs() < 1e-6, "{omega}, {share}: {found} {exact}");
+            } else {
+                let is_possible =
+                    [Class::Periodic { period: 2 * n }, Class::Undecided].contains(&orbit.class);
+                assert!(
+                    share < 5e-7 && is_possible && orbit.status == Status::Neutral,
+                    "{omega}, {share}: {orbit:?}"
+                );
+                uncertain += 1;
+            }
+        }
+    }
+    println!("{uncertain} of {cells} motions: period not certain");
+    assert!(cells == 55 && uncertain <= 10);
 }
 
 /// The steady response grazes the stop where its amplitude is sigma: `F^2 = sigma^2 ((1 - w^2)^2 + c^2 w^2)`.

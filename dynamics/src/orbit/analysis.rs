@@ -107,6 +107,12 @@ pub fn analyse_flow(flow: &Flow, law: Law, start: State, settings: &Settings, ev
     Analysis { event_periods, ..Analysis::new(flow, law, settings) }.orbit(start)
 }
 
+/// Largest error of a cycle's state, relative to the motion, within which a divisor of its period is its period.
+const LARGEST_ERROR: f64 = 1e-3;
+
+/// Distance of a cycle from one of a divisor of its period, in errors, up to which the period is not certain.
+const UNCLEAR_ERRORS: f64 = 10.0;
+
 /// Tangents that grow at most with this power of time do not show chaos. In neutral motion they grow in proportion to time (a free body, a
 /// torus, an undamped oscillation), or to its square at a double root.
 pub const NEUTRAL_ORDER: f64 = 2.0;
@@ -438,7 +444,7 @@ impl Analysis<'_> {
         &self,
         newton: &mut Newton,
         seed: &Trajectory<'_>,
-        cycle: Cycle,
+        mut cycle: Cycle,
         metric: &Metric,
     ) -> Option<Cycle> {
         let divisors = (1..=cycle.period).filter(|p| cycle.period.is_multiple_of(*p));
@@ -449,13 +455,21 @@ impl Analysis<'_> {
                     return Some(cycle);
                 }
                 let image = newton.apply(map, seed, cycle.state)?;
-                // The map amplifies the rounding error of the fixed point.
-                let close = ON_CYCLE * norm(&image.balanced()).max(1.0);
-                if metric.distance(&image.state, &cycle.state) < close
-                    && let Some(shorter) = newton.refine(&seed.at(cycle.state, []), map)
-                {
+                // The map amplifies the error of the fixed point. Beside a flip it is much larger than rounding.
+                let error = cycle.error(metric.distance(&cycle.image, &cycle.state)).min(LARGEST_ERROR);
+                let growth = norm(&image.balanced()).max(1.0);
+                let distance = metric.distance(&image.state, &cycle.state);
+                if distance > growth * ON_CYCLE.max(2.0 * UNCLEAR_ERRORS * error) {
+                    continue;
+                }
+                let Some(shorter) = newton.refine(&seed.at(cycle.state, []), map) else { continue };
+                let apart = metric.distance(&shorter.state, &cycle.state);
+                // Beyond a flip, the unstable cycle lies near every cycle of twice its period.
+                let replaces = apart <= error && (shorter.is_stable() || shorter.is_neutral());
+                if distance < growth * ON_CYCLE || replaces {
                     return Some(shorter);
                 }
+                cycle.may_be_shorter |= apart <= UNCLEAR_ERRORS * error;
             }
         }
         Some(cycle)
@@ -561,7 +575,7 @@ impl Analysis<'_> {
             Status::NearGrazing
         } else if reading.on_strobe {
             Status::StrobeOnEvent
-        } else if cycle.is_neutral() {
+        } else if cycle.is_neutral() || cycle.may_be_shorter {
             Status::Neutral
         } else if distance > ON_CYCLE {
             Status::Slow

@@ -258,6 +258,8 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
         log_radius: if is_resolved { radius.ln() + log_scale } else { f64::NEG_INFINITY },
         monodromy: scaled * scale,
         near_grazing: image.near_grazing,
+        image: image.state,
+        may_be_shorter: false,
     })
 }
 
