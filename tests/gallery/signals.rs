@@ -216,6 +216,33 @@ fn both_engines_measure_contact_that_a_stage_begins_or_ends() {
     assert!(released.iter().any(|energy| energy.abs() > 1e-3), "{released:?}");
 }
 
+/// Without a mesh speed, a series of impacts ends by its limit. A machine replaces its last flights by one with the same time and momentum.
+#[test]
+fn both_engines_close_series_of_impacts_alike() {
+    let text = FileModel::built_in("gear-pair").unwrap().definition().text.clone();
+    for (e, omega) in [(0.06, 3.0), (0.06, 5.6), (0.2, 3.0), (0.3, 3.0), (0.4, 3.0), (0.5, 3.0)] {
+        let of = |signal: &str| {
+            let mut model = with(&text, signal);
+            for (name, value) in [("e", e), ("omega", omega), ("mesh_speed", 0.0)] {
+                model.set(name, value).unwrap();
+            }
+            orbit(&model)
+        };
+        let [pair, machine] = ["", "[[signal]]\nname = 'rate'\nvelocity = [1, 0]\n"].map(of);
+        assert!(
+            is_periodic(&pair) && pair.class == machine.class && pair.mesh_fraction > 0.0,
+            "{e}, {omega}"
+        );
+        let apart = pair.strobe.iter().zip(machine.strobe).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let [a, b] = [&pair, &machine].map(|orbit| orbit.floquet.as_ref().unwrap()[0]);
+        let multipliers = (a[0] - b[0]).hypot(a[1] - b[1]) / a[0].hypot(a[1]);
+        assert!(
+            apart < 5e-11 && multipliers < 1e-6,
+            "{e}, {omega}: states {apart:e}, multipliers {multipliers:e}"
+        );
+    }
+}
+
 fn quantities(model: &FileModel) -> (Quantities, f64) {
     let orbit = orbit(model);
     assert!(is_periodic(&orbit), "{}", model.name());

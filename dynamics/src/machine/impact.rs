@@ -107,7 +107,15 @@ impl Impact<'_> {
             let mut meshing = free;
             meshing.gaps[gap] = if leaving > 0.0 { GapMode::Onset(side) } else { GapMode::Pressed(side) };
             if side.sign() * system.domain(&meshing).departure(gap, &bounced).1 > 0.0 {
-                return outcome(meshing, bounced, true, factor);
+                if leaving <= self.wall.mesh_speed || e >= 1.0 {
+                    return outcome(meshing, bounced, true, factor);
+                }
+                // The rest of the series lasts `2 u / (G (1 - e))` for the leaving speed u and the pressing acceleration G. A flight with
+                // the speed `2 u / (1 - e)` ends at the same time, with the same momentum.
+                let longer = 2.0 / (1.0 - e);
+                let whole =
+                    after(-side.sign() * (1.0 + longer * e) * self.approach, -side.sign() * longer * leaving);
+                return outcome(meshing, whole, true, 1.0 + longer * (e + slope * self.approach));
             }
         }
         outcome(free, bounced, false, factor)

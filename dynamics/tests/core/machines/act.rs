@@ -401,6 +401,8 @@ impl Motion<'_> {
             let acceleration = motion.of(&motion.linear().acceleration[gap]).abs();
             (2.0 * LOWEST_FLIGHT * system.length * acceleration).sqrt()
         };
+        // The rest of a series of impacts is one flight of the same duration and momentum.
+        let whole = if e * closing > wall.mesh_speed && e < 1.0 { 2.0 / (1.0 - e) } else { 1.0 };
         let (mut keep, mut joint) = (Vec::new(), self.joint(i, side, &[]));
         let mut lasts;
         loop {
@@ -411,7 +413,7 @@ impl Motion<'_> {
                     after(self, &joint, 0.0, Mode::Stuck(side));
                     lasts = matches!(self.gaps[i].mode, Mode::Stuck(_));
                 } else if self.presses(&self.linear(), i, side) {
-                    after(self, &joint, e, if e > 0.0 { Mode::Onset(side) } else { Mode::Plain });
+                    after(self, &joint, whole * e, if e > 0.0 { Mode::Onset(side) } else { Mode::Plain });
                     if e == 0.0 {
                         self.enter(i, side);
                         self.gaps[i].leaves = Some((side.mirrored(), 2));
@@ -436,6 +438,8 @@ impl Motion<'_> {
         }
         if lasts && wall.contact == Contact::Rigid {
             (e, slope) = (0.0, 0.0);
+        } else if lasts {
+            (e, slope) = (whole * e, whole * slope);
         }
         let what = if lasts { What::Begins } else { What::Impact };
         self.record_as(i, what, side, symbol(&start.gaps[i], side));
