@@ -11,6 +11,7 @@ mod non_impacting;
 mod oscillator;
 mod pair;
 mod parameter;
+mod rigid_modes;
 mod schedule;
 mod state;
 mod stops;
@@ -27,6 +28,7 @@ pub use oscillator::{
 pub(crate) use pair::is_semidefinite;
 pub use pair::{Domain, Form, Harmonic, OuterWall, Pair, Stage};
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
+pub use rigid_modes::{RigidMode, RigidModes};
 pub use schedule::{MOST_CHANGES, MOST_STAGES};
 pub use state::{REST, STATE, State, state};
 pub(crate) use state::{difference, dot, first_four, sum};

@@ -31,7 +31,7 @@ use flow::{Expansion, Step};
 pub(crate) use meter::PairMeter;
 use step_verdict::{Crossing, StepVerdict};
 
-use crate::model::{Law, Side};
+use crate::model::{Law, Side, State, state};
 use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, STEPS_PER_PERIOD_CAP, Stop, Work,
 };
@@ -119,6 +119,8 @@ pub(crate) struct PairMotion<'f, const N: usize = 0> {
     log_scale: f64,
     events_in_period: u64,
     steps_in_period: u64,
+    /// Sum of all shifts along the rigid-body mode.
+    travelled: f64,
     meshing_time: f64,
     near_grazing: bool,
     work: Work,
@@ -248,10 +250,36 @@ impl<'f, const N: usize> PairMotion<'f, N> {
             self.enter_stage(first, observer);
         }
         self.clock.set(0.0);
+        if self.schedule.whole.rigid_mode.is_some() {
+            // States recur, and positions lose no digits.
+            self.travelled += self.q[2];
+            self.q[2] = 0.0;
+            self.tangents.iter_mut().for_each(|tangent| tangent[2] = 0.0);
+        }
         self.period += 1;
         self.events_in_period = 0;
         self.steps_in_period = 0;
         Ok(())
+    }
+
+    /// Forgets the shifts so far.
+    pub(crate) fn forget_shifts(&mut self) {
+        self.travelled = 0.0;
+    }
+
+    /// Returns a state without the shifts at earlier phases 0.
+    pub(crate) fn unshifted(&self, q: Gap) -> State {
+        let mut y = state(&self.schedule.whole.to_state(q));
+        if let Some([first, second]) = self.schedule.whole.rigid_mode {
+            y[0] += first * self.travelled;
+            y[2] += second * self.travelled;
+        }
+        y
+    }
+
+    /// Returns the sum of all shifts along the rigid-body mode since the start.
+    pub(crate) fn travelled(&self) -> f64 {
+        self.travelled
     }
 
     /// Integrates to the time `until`, which is measured from the last phase 0 and at most the forcing period.

@@ -56,6 +56,7 @@ fn displacement(
     Displacement {
         amplitude,
         mean: (a * z + b * x) / steps,
+        drift: None,
         rms: (square / steps).sqrt(),
         harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
     }

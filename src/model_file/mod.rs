@@ -21,6 +21,7 @@ mod tests;
 use std::sync::Arc;
 
 use rattlemap_dynamics::model::{Law, Model, ModelError, Oscillator, Parameter, Side, Units};
+use rattlemap_dynamics::orbit::DISPLACEMENTS;
 
 pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
@@ -68,6 +69,23 @@ impl FileModel {
     /// Returns the contents of the file.
     pub fn definition(&self) -> &Definition {
         &self.definition
+    }
+
+    /// Returns the places of displacements and signals that a rigid-body mode shifts, whatever the values of the parameters are. Slightly
+    /// changed values tell this, because values that happen to be 0 are no property of the model.
+    fn drifts(&self) -> Vec<usize> {
+        let change = |(i, value): (usize, &f64)| match *value {
+            0.0 => 0.7 + 0.01 * i as f64,
+            value => value * (1.0 + 1e-3 * (i as f64 + 1.0).sin()),
+        };
+        let values: Vec<f64> = self.values.iter().enumerate().map(change).collect();
+        let Ok(oscillator) = self.definition.oscillator(&values).or_else(|_| self.oscillator()) else {
+            return Vec::new();
+        };
+        let modes = oscillator.rigid_modes().modes;
+        let is_shifted =
+            |place: &usize| modes.iter().any(|mode| mode.along(*place, &oscillator.signals) != 0.0);
+        (0..DISPLACEMENTS).filter(is_shifted).collect()
     }
 
     /// Writes the equations of motion as lines, with a contact force for each gap that has walls.
@@ -156,6 +174,7 @@ pub fn subjects(model: &dyn Model) -> Subjects {
         states: model.state_names().into_iter().map(str::to_owned).collect(),
         gaps: several_gaps(model).unwrap_or_default(),
         signals: signals.unwrap_or_default().iter().map(|signal| signal.name.clone()).collect(),
+        drifts: model.downcast_ref::<FileModel>().map_or(Vec::new(), FileModel::drifts),
     }
 }
 

@@ -27,7 +27,7 @@ pub fn classify(record: &Record) -> Class {
             Class::Periodic { period: record.period }
         }
         _ if record.valid & valid::QUASI_PERIODIC != 0 => Class::QuasiPeriodic,
-        Status::Slow | Status::Neutral => Class::Undecided,
+        Status::Slow | Status::Neutral | Status::Accelerates | Status::UnstableCycle => Class::Undecided,
         _ if grows(record) => Class::Chaotic,
         _ => Class::Undecided,
     }

@@ -106,16 +106,17 @@ const GROUP_FIELDS: usize = 12;
 
 /// All fields in the order of files. The last but two has the measured quantities of displacements and gaps that oscillators of at most
 /// two coordinates with one gap do not have, the next one those of each of several gaps. The last one has the only number of the last
-/// group, and those of signals.
+/// group, those of signals, and drifts.
 pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
     let further = field!("further_displacements", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
     let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUP_FIELDS + 3];
     let mut i = fields.len() - 1;
-    fields[i] = field!("release_energy_and_signals", 1 + MEASURES - OF_SIGNALS, 8, |record, nth| record
-        .measures[match nth {
-        0 => places_before(GROUP_FIELDS),
-        nth => OF_SIGNALS + nth - 1,
-    }]);
+    fields[i] =
+        field!("release_energy_signals_and_drifts", 1 + MEASURES - OF_SIGNALS, 8, |record, nth| record
+            .measures[match nth {
+            0 => places_before(GROUP_FIELDS),
+            nth => OF_SIGNALS + nth - 1,
+        }]);
     i -= 1;
     fields[i] = Field { name: "gaps", first: OF_GAPS, count: OF_SIGNALS - OF_GAPS, ..further };
     i = 0;
@@ -134,7 +135,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
 
 impl Record {
     /// Number of bytes in messages to and from pages.
-    pub const BYTES: usize = 1080;
+    pub const BYTES: usize = 1176;
 
     /// Returns the bytes of all fields, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {

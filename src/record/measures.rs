@@ -8,7 +8,7 @@ use rattlemap_dynamics::orbit::{
 };
 
 /// Number of numbers in [`Record::measures`].
-pub const MEASURES: usize = OF_SIGNALS + MOST_SIGNALS * numbers_before(GROUPS.len());
+pub const MEASURES: usize = OF_DRIFTS + MOST_COORDINATES + MOST_SIGNALS;
 
 /// First of the numbers of further displacements and gaps in [`Record::measures`].
 pub(crate) const FURTHER: usize = places_before(GROUPS.len());
@@ -18,6 +18,13 @@ pub(crate) const OF_GAPS: usize = FURTHER + FURTHER_DISPLACEMENTS * numbers_befo
 
 /// First of the numbers of each signal in [`Record::measures`].
 pub(crate) const OF_SIGNALS: usize = OF_GAPS + MOST_GAPS * GAP_GROUPS.len();
+
+/// First of the drifts of displacements and signals in [`Record::measures`].
+pub(crate) const OF_DRIFTS: usize = OF_SIGNALS + MOST_SIGNALS * numbers_before(GROUPS.len());
+
+/// The mean rate of a displacement or a signal that a rigid-body mode shifts. It is requested with the amplitude.
+static DRIFT: Number =
+    number("drift", "drift of {}", Dimension::Speed, |of, i| of.quantities?.displacements[i].drift);
 
 /// Numbers of each gap of a model with several gaps. They have the validity bits of the quantities for all gaps together, and are NaN if
 /// a gap does not have the number.
@@ -52,7 +59,10 @@ pub const GROUPS: [Group; 13] = [
         |of, _| Some(of.quantities?.dissipated))]),
     group("amplitude", 15, true, &[
         number("amplitude", "amplitude of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].amplitude)),
-        number("mean", "mean of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].mean))]),
+        number("mean", "mean of {}", Dimension::Length, |of, i| {
+            let of = &of.quantities?.displacements[i];
+            of.drift.is_none().then_some(of.mean)
+        })]),
     group("rms", 16, true, &[number("rms", "root mean square of {}", Dimension::Length,
         |of, i| Some(of.quantities?.displacements[i].rms))]),
     group("harmonic", 17, true, &[
@@ -207,7 +217,7 @@ impl Group {
     /// average of an aperiodic motion the statistical error of its amplitude. Amplitude and phase are compared as a
     /// complex number.
     pub fn distance(&self, a: &Record, b: &Record, share: f64) -> f64 {
-        let measures: Vec<Measure> = self.measures().collect();
+        let (drifts, measures): (Vec<_>, Vec<_>) = self.measures().partition(Measure::is_drift);
         let largest = |measures: &[Measure]| {
             let sizes = measures.iter().filter(|m| !m.is_angle()).map(|m| b.measures[m.place].abs());
             sizes.fold(0.0, f64::max)
@@ -230,11 +240,19 @@ impl Group {
                 });
                 return relative(x.hypot(y), b[0].abs() + added);
             }
-            // The mean of the mirror image has the other sign.
-            let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), b.abs() + added));
+            // The mean of the mirror image has the other sign. A displacement that drifts has no mean.
+            let have = a.iter().zip(&b).filter(|(a, b)| !(a.is_nan() && b.is_nan()));
+            let distances = have.map(|(a, b)| relative(apart(a.abs(), b.abs()), b.abs() + added));
             distances.fold(0.0, farther)
         };
-        measures.chunks(self.numbers.len()).map(of_subject).fold(0.0, farther)
+        let own = measures.chunks(self.numbers.len()).map(of_subject).fold(0.0, farther);
+        // A drift is a rate, so it is compared with the largest drift alone.
+        let added = share * largest(&drifts);
+        let of_drift = |measure: &Measure| {
+            let [a, b] = [a, b].map(|record| record.measures[measure.place].abs());
+            if a.is_nan() && b.is_nan() { 0.0 } else { relative(apart(a, b), b + added) }
+        };
+        drifts.iter().map(of_drift).fold(own, farther)
     }
 
     /// Returns the numbers of the group.
@@ -282,7 +300,20 @@ pub fn all() -> impl Iterator<Item = Measure> {
             })
         })
     };
-    GROUPS.iter().enumerate().flat_map(of_group)
+    GROUPS.iter().enumerate().flat_map(of_group).chain(of_drifts())
+}
+
+/// Returns the drifts of displacements and signals.
+fn of_drifts() -> impl Iterator<Item = Measure> {
+    let group = Group::named("amplitude").expect("a group has this name");
+    let displacements = (0..MOST_COORDINATES).map(Subject::Displacement);
+    let subjects = displacements.chain((0..MOST_SIGNALS).map(Subject::Signal));
+    (OF_DRIFTS..).zip(subjects).map(move |(place, subject)| Measure {
+        place,
+        group,
+        subject: Some(subject),
+        number: &DRIFT,
+    })
 }
 
 /// Returns the numbers of each gap, in the order of columns in tables.
@@ -318,6 +349,8 @@ pub struct Subjects {
     pub gaps: Vec<String>,
     /// Signals.
     pub signals: Vec<String>,
+    /// Places of displacements and signals that drift, for all values of the parameters, in [`Quantities::displacements`].
+    pub drifts: Vec<usize>,
 }
 
 impl Subjects {
@@ -330,7 +363,9 @@ impl Subjects {
 impl Measure {
     /// Whether a motion with these names has the number.
     pub fn is_of(&self, names: &Subjects) -> bool {
-        self.subject(names).is_some()
+        let drifts = self.subject.is_some_and(|subject| names.drifts.contains(&subject.place()));
+        let is_there = if self.is_odd() { self.is_drift() == drifts } else { true };
+        is_there && self.subject(names).is_some()
     }
 
     /// Returns the name of the displacement, gap or signal, or an empty text if the number describes the whole motion; none if the model
@@ -393,9 +428,14 @@ impl Measure {
         self.number.dimension
     }
 
+    /// Whether it is the drift of a displacement or a signal.
+    fn is_drift(&self) -> bool {
+        self.number.name == DRIFT.name
+    }
+
     /// Whether the mirror image of a motion has the opposite value.
     pub fn is_odd(&self) -> bool {
-        self.number.name == "mean"
+        ["mean", "drift"].contains(&self.number.name)
     }
 
     /// Whether the number is an angle, so that minus pi and pi are equal.
@@ -481,8 +521,11 @@ impl Record {
             match measure.read(motion) {
                 // The sum turns minus zero into zero, so that columns of zeros take no memory.
                 Some(value) => self.measures.set(measure.place, value + 0.0),
-                // A signal that is too large takes no other number away.
-                None if measure.signal().is_some() => self.measures.set(measure.place, f64::NAN),
+                None if measure.is_drift() => self.measures.set(measure.place, 0.0),
+                // A signal that is too large takes no other number away, and a displacement that drifts has no mean.
+                None if measure.signal().is_some() || measure.is_odd() && motion.quantities.is_some() => {
+                    self.measures.set(measure.place, f64::NAN);
+                }
                 None => self.valid &= !measure.group.bit,
             }
         }
@@ -547,7 +590,7 @@ mod tests {
         let of = |states: &[&str], gaps: &[&str], signals: &[&str]| -> Vec<String> {
             let [states, gaps, signals] =
                 [states, gaps, signals].map(|names| names.iter().map(ToString::to_string).collect());
-            let names = Subjects { states, gaps, signals };
+            let names = Subjects { states, gaps, signals, drifts: Vec::new() };
             let own = |group: &Group| group.measures().filter(|m| m.is_of(&names)).collect::<Vec<_>>();
             let groups = ["amplitude", "harmonic", "multiplier"].map(|name| own(Group::named(name).unwrap()));
             groups.concat().iter().map(|measure| measure.name(&names)).collect()

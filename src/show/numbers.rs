@@ -157,7 +157,8 @@ fn of_gaps(quantity: Quantity, names: &Subjects) -> Vec<Number> {
 }
 
 fn of_measure(measure: Measure, quantity: Quantity, names: &Subjects) -> Option<Number> {
-    let subject = measure.subject(names)?;
+    let subject = measure.subject(names).filter(|_| measure.is_of(names))?;
+    let is_rate = measure.dimension() == Dimension::Speed;
     Some(Number {
         name: measure.name(names),
         title: measure.title(subject),
@@ -166,7 +167,7 @@ fn of_measure(measure: Measure, quantity: Quantity, names: &Subjects) -> Option<
         dimension: measure.dimension(),
         unit: None,
         quantity,
-        component: measure.coordinate().map(|i| 2 * i),
+        component: measure.coordinate().map(|i| 2 * i + usize::from(is_rate)),
         source: Source::Measure(measure),
     })
 }

@@ -182,6 +182,10 @@ fn status(status: Status) -> &'static str {
         }
         Status::Neutral => "neutral: a multiplier has modulus 1; perturbations neither decay nor grow",
         Status::Escape => "escape: the motion grows without bound",
+        Status::UnstableCycle => {
+            "unstable_cycle: the motion stays on an unstable cycle; any perturbation leads it away"
+        }
+        Status::Accelerates => "accelerates: a load accelerates the motion for ever, and nothing opposes it",
     }
 }
 

@@ -8,6 +8,7 @@ mod cycle;
 mod ball;
 mod clearance;
 mod clutch;
+mod drift;
 mod elastic;
 mod engines;
 mod files;

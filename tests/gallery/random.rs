@@ -212,7 +212,7 @@ fn check_judge(seeds: std::ops::Range<u32>) {
             }
             let mut flight = Flight::new(&cell.model.oscillator().expect("valid"), &cell.start);
             flight.advance(0.0, std::f64::consts::TAU)?;
-            let state = trajectory.state();
+            let state = trajectory.unshifted_state();
             let scale = state.iter().fold(cell.oscillator.length_scale(), |m, x| m.max(x.abs()));
             let counts = match flight.cuts_series() {
                 true => [0; 2],

@@ -23,39 +23,42 @@ pub(super) struct Flight<'a> {
     pub(super) start: f64,
 }
 
-/// A linear function of the motion, and its rate.
+/// A linear function of the motion and of time, and its rate.
 struct Measured {
     value: Functional,
     rate: Functional,
+    /// Minus a drift: its value at the start of the flight, and its rate.
+    drift: [f64; 2],
 }
 
 impl Measured {
-    fn at(&self, point: &PhasePoint) -> f64 {
-        self.value.dot(point)
+    /// Returns the value at a point, which is reached after a time.
+    fn at(&self, point: &PhasePoint, after: f64) -> f64 {
+        self.value.dot(point) + (self.drift[0] + self.drift[1] * after)
     }
 
     fn rate(&self, point: &PhasePoint) -> f64 {
-        self.rate.dot(point)
+        self.rate.dot(point) + self.drift[1]
     }
 }
 
 impl Flight<'_> {
     /// Adds the flight to integrals and extremes.
     pub(super) fn add_to(&self, sums: &mut Sums) {
-        let (displacements, forces) = (self.displacements(), self.contact_forces());
+        let (displacements, forces) = (self.displacements(sums), self.contact_forces());
         let mut before: Option<(f64, PhasePoint)> = None;
         for (share, weight) in nodes().into_iter().chain([(1.0, 0.0)]) {
             let point = self.at(share);
             let (sin, cos) = (self.system.machine.omega * (self.start + share * self.duration)).sin_cos();
-            let weight = weight * self.duration;
+            let (weight, after) = (weight * self.duration, share * self.duration);
             for (place, signal) in &displacements {
                 let moments = &mut sums.displacements[*place];
-                moments.integrate(weight, signal.at(&point), [cos, sin]);
+                moments.integrate(weight, signal.at(&point, after), [cos, sin]);
             }
             sums.dissipated += weight * self.dissipation(&point);
             sums.heat += weight * self.heat(&point);
             for (gap, signal) in &forces {
-                let square = weight * signal.at(&point).powi(2);
+                let square = weight * signal.at(&point, after).powi(2);
                 sums.force.square += square;
                 sums.contact_time += weight;
                 sums.gaps[*gap].force.square += square;
@@ -66,11 +69,12 @@ impl Flight<'_> {
             }
             let (start, from) = before.unwrap_or_else(|| (0.0, self.at(0.0)));
             let include = |moments: &mut Moments, signal: &Measured| {
-                moments.include(signal.at(&from));
-                moments.include(signal.at(&point));
+                moments.include(signal.at(&from, start * self.duration));
+                moments.include(signal.at(&point, after));
                 if signal.rate(&from) * signal.rate(&point) < 0.0 {
                     let rate = |share: f64| signal.rate(&self.at(share));
-                    moments.include(signal.at(&self.at(root(start, share, rate))));
+                    let extreme = root(start, share, rate);
+                    moments.include(signal.at(&self.at(extreme), extreme * self.duration));
                 }
             };
             displacements.iter().for_each(|(place, signal)| include(&mut sums.displacements[*place], signal));
@@ -93,18 +97,27 @@ impl Flight<'_> {
     }
 
     fn signal(&self, value: Functional) -> Measured {
-        Measured { rate: self.domain.rate_of(&value), value }
+        Measured { rate: self.domain.rate_of(&value), value, drift: [0.0; 2] }
     }
 
     /// Returns all displacements, gaps and signals, by their places in [`Quantities::displacements`](crate::orbit::Quantities::displacements).
-    fn displacements(&self) -> Vec<(usize, Measured)> {
+    fn displacements(&self, sums: &Sums) -> Vec<(usize, Measured)> {
         let displacements = (0..self.system.machine().degrees())
             .map(|i| (place_of_displacement(i), self.system.displacement_row(i)));
         let gaps = (0..self.system.gaps()).map(|gap| (place_of_gap(gap), self.domain.unit_row(gap)));
         let signals = self.system.machine.signals.iter().enumerate();
         let signals = signals.map(|(i, own)| (place_of_signal(i), self.system.signal_row(own, self.domain)));
         let all = displacements.chain(gaps).chain(signals);
-        all.map(|(place, row)| (place, self.signal(row))).collect()
+        let mut all: Vec<_> = all.map(|(place, row)| (place, self.signal(row))).collect();
+        for (mode, drift) in self.system.rigid_modes.modes.iter().zip(&sums.drifts) {
+            let ahead = drift.ahead - drift.rate * self.start;
+            for (place, signal) in &mut all {
+                let along = mode.along(*place, &self.system.machine.signals);
+                signal.drift[0] += along * ahead;
+                signal.drift[1] -= along * drift.rate;
+            }
+        }
+        all
     }
 
     /// Returns the gaps with compliant contact and its force, positive where it pushes.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Numbers, PhasePoint, ROUNDING, SIZE};
-use crate::model::{Contact, Oscillator, Side, Wall};
+use crate::model::{Contact, Oscillator, RigidMode, RigidModes, Side, Wall};
 
 /// Linear forces in the coordinates of the flow.
 #[derive(Clone, Debug)]
@@ -29,6 +29,13 @@ impl Element {
         let terms = self.row.iter().zip(rates).map(|(row, rate)| row * rate);
         terms.fold([-self.speed, self.speed.abs()], |[sum, size], x| [sum + x, size + x.abs()])
     }
+}
+
+/// A rigid-body mode: the factors of `d` in the coordinate that measures the shift, and the shift of all `d` by 1.
+#[derive(Clone, Debug)]
+pub(super) struct Shift {
+    pub(super) measure: Numbers,
+    pub(super) direction: Numbers,
 }
 
 /// A machine in the coordinates of its flow.
@@ -60,6 +67,9 @@ pub struct Frame {
     pub(super) elements: Vec<Element>,
     /// Changes of the stage: time since phase 0, and stage.
     pub(super) schedule: Vec<(f64, usize)>,
+    /// Rigid-body modes, and in the coordinates of the flow.
+    pub(super) rigid_modes: RigidModes,
+    pub(super) shifts: Vec<Shift>,
 }
 
 impl Frame {
@@ -101,8 +111,25 @@ impl Frame {
             (0..n).for_each(|i| kick[i] = mobility[(i, gap)] / mobility[(gap, gap)]);
             kick
         };
+        let entries = |of: &mut dyn Iterator<Item = f64>| {
+            let mut all = [0.0; SIZE];
+            all.iter_mut().zip(of).for_each(|(entry, value)| *entry = value);
+            all
+        };
+        let shift = |mode: &RigidMode| {
+            let mut direction = &to_flow * &mode.direction;
+            direction.rows_mut(0, machine.gaps.len()).fill(0.0);
+            Shift {
+                measure: entries(&mut from_flow.row(mode.coordinate).iter().copied()),
+                direction: entries(&mut direction.iter().copied()),
+            }
+        };
+        let rigid_modes = machine.rigid_modes();
+        let shifts = rigid_modes.modes.iter().map(shift).collect();
         let mut frame = Frame {
             n,
+            rigid_modes,
+            shifts,
             period,
             length,
             speed: 0.0,
@@ -154,6 +181,10 @@ impl Frame {
     /// Returns the machine.
     pub fn machine(&self) -> &Oscillator {
         &self.machine
+    }
+
+    pub(crate) fn rigid_modes(&self) -> &RigidModes {
+        &self.rigid_modes
     }
 
     /// Returns the forcing period.

@@ -13,7 +13,7 @@ use super::flight::Flight;
 use super::modes::Modes;
 use super::watch::{Moment, Roots, Watch};
 use super::{Numbers, PhasePoint};
-use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
+use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop, Work,
 };
@@ -54,6 +54,8 @@ pub struct MachineMotion<'s> {
     steps_in_period: u64,
     contact_time: f64,
     sticking_time: f64,
+    /// Sums of all shifts along rigid-body modes.
+    travelled: [f64; MOST_COORDINATES],
     near_grazing: bool,
     work: Work,
     allowance: Allowance<'s>,
@@ -88,6 +90,21 @@ impl<'s> MachineMotion<'s> {
     /// Returns the time during which an element with dry friction stuck.
     pub fn sticking_time(&self) -> f64 {
         self.sticking_time
+    }
+
+    /// Forgets the shifts so far.
+    pub(crate) fn forget_shifts(&mut self) {
+        self.travelled = [0.0; MOST_COORDINATES];
+    }
+
+    /// Returns the state of a point without the shifts at earlier phases 0.
+    fn unshifted(&self, point: &PhasePoint) -> Numbers {
+        self.system.rigid_modes.shifted(self.system.to_state(point), &self.travelled)
+    }
+
+    /// Returns the sums of all shifts along rigid-body modes since the start.
+    pub(crate) fn travelled(&self) -> [f64; MOST_COORDINATES] {
+        self.travelled
     }
 
     /// Returns the side of a gap's lasting contact, if there is one.
@@ -189,9 +206,30 @@ impl<'s> MachineMotion<'s> {
             self.set_clock(0.0);
             self.change = 1;
         }
+        self.shift_back(observer);
         self.period += 1;
         (self.events_in_period, self.steps_in_period) = (0, 0);
         Ok(())
+    }
+
+    /// Shifts the motion back along rigid-body modes, so that its states recur, and positions lose no digits.
+    fn shift_back(&mut self, observer: &mut dyn Observer) {
+        let (system, n) = (self.system, self.system.n);
+        for (nth, shift) in system.shifts.iter().enumerate() {
+            let back = |y: &mut [f64]| {
+                let by: f64 = shift.measure[..n].iter().zip(&*y).map(|(factor, y)| factor * y).sum();
+                y.iter_mut().zip(&shift.direction[..n]).for_each(|(y, direction)| *y -= by * direction);
+                by
+            };
+            let by = back(&mut self.point);
+            self.tangents.iter_mut().for_each(|tangent| {
+                back(tangent);
+            });
+            self.travelled[nth] += by;
+            if let Some(sums) = observer.sums() {
+                sums.drifts[nth].ahead += by - sums.drifts[nth].rate * system.period;
+            }
+        }
     }
 
     /// Integrates to a time since the last phase 0 of at most the forcing period.

@@ -1,8 +1,10 @@
 //! An oscillator, prepared for its motions.
 
+use super::Drift;
 use crate::machine::System;
 use crate::model::{
-    Contact, Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, State, first_four, state,
+    Contact, Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, RigidMode, RigidModes, Signal,
+    State, first_four, state,
 };
 use crate::pair::PairFlow;
 use crate::pair::flow::power_of_two;
@@ -35,6 +37,8 @@ pub struct Flow {
     pub(crate) degrees: usize,
     symmetric: bool,
     non_impacting: Option<NonImpacting>,
+    /// Rigid-body modes. The motion is shifted back along them at each phase 0.
+    pub rigid_modes: RigidModes,
     engine: Engine,
 }
 
@@ -66,6 +70,7 @@ impl Flow {
             degrees: pair.degrees,
             symmetric: pair.mirror_symmetric(),
             non_impacting: NonImpacting::new(pair).or_else(|| NonImpacting::with_one_at_rest(pair)),
+            rigid_modes: pair.rigid_modes(),
             engine: Engine::Pair(flow),
         }
     }
@@ -82,6 +87,7 @@ impl Flow {
             degrees: machine.degrees(),
             symmetric: machine.mirror_symmetric(),
             non_impacting: NonImpacting::of_machine(machine),
+            rigid_modes: system.rigid_modes().clone(),
             engine: Engine::Machine(system),
         }
     }
@@ -130,9 +136,10 @@ impl Flow {
         self.symmetric && (self.pair().is_none() || law.is_symmetric())
     }
 
-    /// Whether [`Trajectory::mirrored`](super::Trajectory) is available: for mirror-symmetric pairs. Modes of a machine cannot be mirrored.
+    /// Whether [`Trajectory::mirrored`](super::Trajectory) is available: for mirror-symmetric pairs without rigid-body modes. Modes of a machine
+    /// cannot be mirrored.
     pub(crate) fn is_half_symmetric(&self, law: &Law) -> bool {
-        self.pair().is_some() && self.mirror_symmetric(law)
+        self.pair().is_some() && self.rigid_modes.modes.is_empty() && self.mirror_symmetric(law)
     }
 
     /// Returns the stable steady motion that touches no wall, if there is one. Some coordinates may have to be at rest.
@@ -155,6 +162,20 @@ impl Flow {
                 let mut walls = system.machine().gaps.iter().flat_map(|gap| gap.walls.iter().flatten());
                 walls.any(|wall| wall.contact == Contact::Pushing)
             }
+        }
+    }
+
+    /// Returns the drift of a displacement, a gap or a signal, by its place, if a rigid-body mode shifts it.
+    pub(crate) fn drift(&self, place: usize, drifts: &[Drift]) -> Option<f64> {
+        let along = |mode: &RigidMode| mode.along(place, self.signals());
+        let rates = self.rigid_modes.modes.iter().zip(drifts).map(|(mode, drift)| along(mode) * drift.rate);
+        self.rigid_modes.modes.iter().any(|mode| along(mode) != 0.0).then(|| rates.sum())
+    }
+
+    fn signals(&self) -> &[Signal] {
+        match &self.engine {
+            Engine::Pair(_) => &[],
+            Engine::Machine(system) => &system.machine().signals,
         }
     }
 

@@ -132,6 +132,15 @@ impl GapSums {
         GapSums { impacts: 0, contact_time: 0.0, lost: Energy::NONE, force: Moments::NONE, force_time: 0.0 };
 }
 
+/// A drift along a rigid-body mode, which displacements are measured without.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Drift {
+    /// Its mean rate.
+    pub(crate) rate: f64,
+    /// How far the motion is ahead of the mean rate, without the position since the latest phase 0.
+    pub(crate) ahead: f64,
+}
+
 /// Integrals and extremes so far.
 #[derive(Clone, Debug)]
 pub struct Sums {
@@ -153,6 +162,8 @@ pub struct Sums {
     pub(crate) heat: f64,
     /// Each gap of a machine.
     pub(crate) gaps: [GapSums; MOST_GAPS],
+    /// Drifts along the rigid-body modes of a machine.
+    pub(crate) drifts: [Drift; MOST_COORDINATES],
 }
 
 impl Sums {
@@ -167,6 +178,7 @@ impl Sums {
         sticking_time: 0.0,
         heat: 0.0,
         gaps: [GapSums::NONE; MOST_GAPS],
+        drifts: [Drift { rate: 0.0, ahead: 0.0 }; MOST_COORDINATES],
     };
 
     /// Counts an approach to a wall.

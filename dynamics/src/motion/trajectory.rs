@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use super::{Allowance, Engine, Flow, GapEvent, Observer, Stop, Sums, Work};
 use crate::machine::{MachineMotion, System};
-use crate::model::{Law, REST, Side, State, first_four, state};
+use crate::model::{Law, MOST_COORDINATES, REST, Side, State, first_four, state};
 use crate::pair::{PairMeter, PairMotion};
 
 /// The motion of one oscillator. `N` is the number of tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix. For a
@@ -231,6 +231,26 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         match &self.motion {
             Engines::Pair(_) => 0.0,
             Engines::Machine(motion) => motion.sticking_time(),
+        }
+    }
+
+    /// Returns the present state without the shifts along rigid-body modes at earlier phases 0: its displacements are continuous.
+    pub fn unshifted_state(&self) -> State {
+        self.flow.rigid_modes.shifted(self.state(), &self.travelled())
+    }
+
+    /// Forgets the shifts so far, so that displacements continue from the present state.
+    pub(crate) fn forget_shifts(&mut self) {
+        each!(mut self, motion => motion.forget_shifts());
+    }
+
+    /// Returns the sums of all shifts along rigid-body modes since the start.
+    pub(crate) fn travelled(&self) -> [f64; MOST_COORDINATES] {
+        match &self.motion {
+            Engines::Pair(motion) => {
+                std::array::from_fn(|nth| if nth == 0 { motion.travelled() } else { 0.0 })
+            }
+            Engines::Machine(motion) => motion.travelled(),
         }
     }
 

@@ -63,6 +63,9 @@ const REPORT_INTERVAL: u64 = 64;
 /// Number of steps after which the window of an undecided motion is not extended.
 const EXTENSION_STEPS: u64 = 100_000_000;
 
+/// Number of first strobe states that show whether a motion begins on a cycle.
+const FIRST_STROBES: usize = 17;
+
 /// Largest number of cycles in a test for approach.
 const APPROACH_CYCLE_CAP: f64 = 4000.0;
 
@@ -263,9 +266,18 @@ impl Analysis<'_> {
     fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
         let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(self.allowance);
         let transient = self.settings.transient_periods;
+        let mut first = vec![start];
         for _ in 0..transient {
             trajectory.advance_period(&mut ())?;
             self.count(periods_run, u64::from(transient) + u64::from(self.settings.observed_periods));
+            if first.len() < FIRST_STROBES {
+                first.push(trajectory.state());
+                if first.len() == FIRST_STROBES
+                    && let Some(orbit) = self.begins_on_unstable(&trajectory, &first, periods_run)?
+                {
+                    return Ok(orbit);
+                }
+            }
         }
         if let Some(orbit) = self.non_impacting(&trajectory)? {
             return Ok(orbit);
@@ -274,6 +286,9 @@ impl Analysis<'_> {
         let last = length.max(self.longest_window);
         loop {
             let window = self.observe(&mut trajectory, length, periods_run)?;
+            if self.flow.rigid_modes.accelerates {
+                return self.aperiodic(trajectory, &window, Class::Undecided, Status::Accelerates);
+            }
             let found = candidates(&window.strobes, &window.metric, self.settings.max_period);
             for candidate in &found {
                 if let Some(orbit) = self.confirm(&trajectory, &window, candidate)? {
@@ -395,12 +410,64 @@ impl Analysis<'_> {
             let now = window.metric.distance(&trajectory.state(), &cycle.state);
             let distance = match cycle.is_stable() {
                 true => self.approach(trajectory, &cycle, &window.metric)?,
+                false if self.stays_on_unstable(window, &cycle) => {
+                    return self.on_unstable(trajectory, window, cycle).map(Some);
+                }
                 // Motion near a neutral cycle neither approaches nor leaves it.
                 false => Some(now).filter(|&now| cycle.is_neutral() && now < ON_CYCLE),
             };
             if let Some(distance) = distance {
                 let reading = self.read(trajectory, &cycle)?;
                 return Ok(Some(self.periodic(trajectory, &reading, &cycle, distance)?));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether the motion has stayed on an unstable cycle over a window, and further windows would not lead it away: either its distance grows
+    /// too slowly, or rounding errors would have led it away already, and do not grow for a reason such as a symmetry.
+    fn stays_on_unstable(&self, window: &Window, cycle: &Cycle) -> bool {
+        let mut strobes = window.strobes.iter().rev().step_by(cycle.period as usize);
+        let growth = cycle.log_radius / f64::from(cycle.period);
+        let remains = growth * 2.0 * f64::from(self.longest_window) < (RECURRENCE_DISTANCE / ON_CYCLE).ln();
+        let resists = growth * window.strobes.len() as f64 > (ON_CYCLE / f64::EPSILON).ln();
+        (remains || resists)
+            && !cycle.is_neutral()
+            && strobes.all(|y| window.metric.distance(y, &cycle.state) < ON_CYCLE)
+    }
+
+    /// Builds the orbit of a motion that stays on an unstable cycle.
+    fn on_unstable(
+        &self,
+        trajectory: &Trajectory<'_, 0>,
+        window: &Window,
+        cycle: Cycle,
+    ) -> Result<Orbit, Stop> {
+        let orbit = self.aperiodic(trajectory.clone(), window, Class::Undecided, Status::UnstableCycle)?;
+        Ok(Orbit { floquet: Some(cycle.multipliers), ..orbit })
+    }
+
+    /// Returns the orbit of a motion that begins on an unstable cycle and stays there, given its first strobe states.
+    fn begins_on_unstable(
+        &self,
+        trajectory: &Trajectory<'_, 0>,
+        strobes: &[State],
+        periods_run: &mut u64,
+    ) -> Result<Option<Orbit>, Stop> {
+        let metric = Metric::of(strobes, self.flow);
+        let returns = |period: &usize| {
+            (*period..strobes.len()).all(|i| metric.distance(&strobes[i], &strobes[i - period]) < ON_CYCLE)
+        };
+        let Some(period) = (1..=strobes.len() / 2).find(returns) else { return Ok(None) };
+        for map in self.maps(period as u32) {
+            let found = Newton::default().refine(trajectory, map);
+            let Some(cycle) = found.filter(|cycle| !cycle.is_stable() && !cycle.is_neutral()) else {
+                continue;
+            };
+            let mut ahead = trajectory.clone();
+            let window = self.observe(&mut ahead, strobes.len() as u32, periods_run)?;
+            if self.stays_on_unstable(&window, &cycle) {
+                return self.on_unstable(&ahead, &window, cycle).map(Some);
             }
         }
         Ok(None)
@@ -432,7 +499,8 @@ impl Analysis<'_> {
             let mut half = seed.at(cycle.state, []);
             let middle = (0..cycle.period / 2).try_for_each(|_| half.advance_period(&mut ()));
             middle.and_then(|()| half.advance_to(0.5 * self.flow.period, &mut ())).ok()?;
-            let distance = metric.distance(&half.state().map(|value| -value), &cycle.state);
+            let mirrored = self.flow.rigid_modes.shifted_back(half.state().map(|value| -value));
+            let distance = metric.distance(&mirrored, &self.flow.rigid_modes.shifted_back(cycle.state));
             // The map amplifies the rounding error of the fixed point.
             let image = newton.apply(StrobeMap::Periods(cycle.period), seed, cycle.state)?;
             cycle.symmetric = distance < ON_CYCLE * norm(&image.balanced()).max(1.0);

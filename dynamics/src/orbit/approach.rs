@@ -145,6 +145,8 @@ mod tests {
             multipliers: Vec::new(),
             log_radius: radius.ln(),
             near_grazing: false,
+            image: REST,
+            may_be_shorter: false,
         }
     }
 

@@ -175,6 +175,7 @@ fn measure_by_strobes(
         cycle: None,
         approaches: false,
         is_neutral: false,
+        is_on_unstable: false,
         counts: vec![[0.0; 3]],
         itineraries: Vec::new(),
         near_strobe: 0,
@@ -185,7 +186,9 @@ fn measure_by_strobes(
     let measured = run.run(start).unwrap_or_else(|stop| run.without_results(status_of(stop)));
     let is_on_strobe = match measured.status {
         Status::StrobeOnEvent => true,
-        Status::Slow | Status::Neutral => measured.period.is_none() && run.has_events_at_strobes(),
+        Status::Slow | Status::Neutral | Status::Accelerates => {
+            measured.period.is_none() && run.has_events_at_strobes()
+        }
         _ => false,
     };
     (measured, is_on_strobe)
@@ -222,6 +225,8 @@ struct CellRun<'a> {
     approaches: bool,
     /// Whether the last check found a neutral cycle nearby.
     is_neutral: bool,
+    /// Whether the motion lies on an unstable cycle when its budget ends.
+    is_on_unstable: bool,
     /// Impacts and meshing time up to each strobe.
     counts: Vec<[f64; 3]>,
     /// Itinerary of each period.
@@ -400,6 +405,7 @@ impl<'a> CellRun<'a> {
                 }
                 // An unstable cycle is unstable at its smallest period, too.
                 if !cycle.is_stable() {
+                    self.is_on_unstable |= is_last && metric.distance(&state, &cycle.state) < ON_CYCLE;
                     self.history.add_unstable(map, &cycle);
                     continue;
                 }
@@ -558,12 +564,16 @@ impl<'a> CellRun<'a> {
             || least.is_some_and(is_neutral)
             || 2.0 * near_saddle_periods as f64 >= span && least.is_none_or(is_escape);
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
-        let is_quasi_periodic = self.strobes.len() > self.budget.periods() as usize
+        let accelerates = self.analysis.flow.rigid_modes.accelerates;
+        let is_quasi_periodic = !accelerates
+            && self.strobes.len() > self.budget.periods() as usize
             && lyapunov.is_some_and(|(mean, error)| {
                 mean >= -errors * error - GROWTH_ROUNDING / period && is_neutral(mean.abs())
             })
             && is_regular(late, &Metric::of(late, self.analysis.flow), max_period);
         let status = match slow {
+            _ if accelerates => Status::Accelerates,
+            true if self.is_on_unstable => Status::UnstableCycle,
             true if self.is_neutral => Status::Neutral,
             true => Status::Slow,
             false => Status::Ok,

@@ -70,7 +70,7 @@ pub(super) fn after_events(trajectory: &Trajectory<'_, 0>, tolerance: f64) -> (S
     };
     match (advanced, log.events.last()) {
         (Ok(()), Some(event)) => (event.after, ahead.meshing()),
-        _ => (trajectory.state(), trajectory.meshing()),
+        _ => (trajectory.unshifted_state(), trajectory.meshing()),
     }
 }
 

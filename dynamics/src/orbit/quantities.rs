@@ -78,6 +78,9 @@ pub struct Displacement {
     pub amplitude: f64,
     /// Average over time.
     pub mean: f64,
+    /// Mean rate, if a [rigid-body mode](crate::model::RigidMode) shifts the displacement. `mean` is then arbitrary, and all other numbers
+    /// are those of the displacement without drift and mean.
+    pub drift: Option<f64>,
     /// Root mean square.
     pub rms: f64,
     /// Amplitude `a > 0` and phase `phi` in `(-pi, pi]` of the component `a cos(omega t + phi)`.
@@ -94,6 +97,7 @@ impl Displacement {
         Displacement {
             amplitude: 0.5 * (moments.high - moments.low),
             mean: moments.value / time,
+            drift: None,
             rms: (moments.square / time).sqrt(),
             harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
         }
@@ -133,14 +137,22 @@ pub(super) struct Meter<'f> {
 }
 
 impl<'f> Meter<'f> {
-    /// Begins at phase 0, at the present state of a trajectory.
-    pub(super) fn new(trajectory: &Trajectory<'f>) -> Meter<'f> {
-        Meter {
-            flow: trajectory.flow(),
-            first_period: trajectory.period(),
-            flights: trajectory.flights(),
-            sums: Sums::NONE,
+    /// Begins at phase 0, at the present state of a trajectory, and finds the drift over the following `periods` if there are rigid-body
+    /// modes.
+    ///
+    /// # Errors
+    /// A [`Stop`] if the trajectory cannot be continued.
+    pub(super) fn new(trajectory: &Trajectory<'f>, periods: u32) -> Result<Meter<'f>, Stop> {
+        let (flow, mut sums) = (trajectory.flow(), Sums::NONE);
+        if !flow.rigid_modes.modes.is_empty() {
+            let mut ahead = trajectory.clone();
+            (0..periods).try_for_each(|_| ahead.advance_period(&mut ()))?;
+            let (time, from) = (f64::from(periods) * flow.period, trajectory.travelled());
+            for (nth, drift) in sums.drifts.iter_mut().enumerate() {
+                drift.rate = (ahead.travelled()[nth] - from[nth]) / time;
+            }
         }
+        Ok(Meter { flow, first_period: trajectory.period(), flights: trajectory.flights(), sums })
     }
 
     /// Advances a trajectory by `periods` forcing periods and measures it.
@@ -148,7 +160,7 @@ impl<'f> Meter<'f> {
     /// # Errors
     /// A [`Stop`] if the trajectory cannot be continued.
     pub(super) fn measure(trajectory: &mut Trajectory<'f>, periods: u32) -> Result<Quantities, Stop> {
-        let mut meter = Meter::new(trajectory);
+        let mut meter = Meter::new(trajectory, periods)?;
         for _ in 0..periods {
             trajectory.advance_period(&mut meter)?;
         }
@@ -185,7 +197,13 @@ impl<'f> Meter<'f> {
             release_energy: self.flow.has_pushing_walls().then_some(sums.released.sum() / time),
             contact_force: (sums.contact_time > 0.0)
                 .then(|| [sums.force.high, (sums.force.square / sums.contact_time).sqrt()]),
-            displacements: sums.displacements.map(|moments| Displacement::of(&moments, time)),
+            displacements: std::array::from_fn(|place| {
+                let of = Displacement::of(&sums.displacements[place], time);
+                let drift = self.flow.drift(place, &sums.drifts);
+                // The position along a rigid-body mode is arbitrary, so the mean is removed.
+                let rms = drift.map_or(of.rms, |_| (of.rms.powi(2) - of.mean.powi(2)).max(0.0).sqrt());
+                Displacement { drift, rms, ..of }
+            }),
             dissipated: sums.dissipated / time,
             friction: self.flow.has_friction().then(|| FrictionQuantities {
                 sticking: share(sums.sticking_time, time),

@@ -41,6 +41,7 @@ impl Reading {
         periods: u32,
         measures: bool,
     ) -> Result<Reading, Stop> {
+        trajectory.forget_shifts();
         let (strobe, strobe_meshing) = (trajectory.state(), trajectory.meshing());
         let first = trajectory.clone();
         let start = trajectory.period();
@@ -51,7 +52,7 @@ impl Reading {
             symbols: Vec::new(),
             start,
             recorders: vec![Recorder::new(flow); periods as usize],
-            meter: measures.then(|| Meter::new(&first)),
+            meter: measures.then(|| Meter::new(&first, periods)).transpose()?,
             times: Vec::new(),
         };
         for _ in 0..periods {

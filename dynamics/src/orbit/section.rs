@@ -59,7 +59,8 @@ impl Section {
     pub(super) fn strobe(&self, law: Law, state: State, tolerance: f64) -> Option<(State, Option<Side>)> {
         let mut trajectory = Trajectory::<0>::new(&self.flow, law, state);
         trajectory.advance_to(self.time_to_strobe(), &mut ()).ok()?;
-        Some(after_events(&trajectory, tolerance * self.flow.period))
+        let (state, meshing) = after_events(&trajectory, tolerance * self.flow.period);
+        Some((self.flow.rigid_modes.shifted_back(state), meshing))
     }
 
     /// Converts quantities whose time begins at this phase to times since phase 0.

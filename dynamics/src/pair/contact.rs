@@ -2,7 +2,7 @@
 
 use super::sticking::RELEASE_ORDER;
 use super::{Crossing, Mode, PairMotion, side_of};
-use crate::model::{Contact, Side, state};
+use crate::model::{Contact, Side};
 use crate::motion::{EventKind, GRAZING_SPEED, GapEvent, Observer};
 use crate::pair::flow::{DomainKind, Gap, LinearFlow};
 
@@ -255,7 +255,7 @@ impl<const N: usize> PairMotion<'_, N> {
             ends_series,
         };
         let after = self.q;
-        observer.event(&event, &|| [before, after].map(|q| state(&whole.to_state(q))));
+        observer.event(&event, &|| [before, after].map(|q| self.unshifted(q)));
     }
 
     /// Corrects a start of a step that rounding has put on or beyond its boundary, as when an event lies within

@@ -60,7 +60,7 @@ pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
 use super::PairState;
-use crate::model::{Contact, Pair, Side};
+use crate::model::{Contact, Pair, RigidMode, Side};
 
 /// Gap coordinates `(z, w, x, v)`, the last two of the displacement [`Pair::other`].
 pub type Gap = [f64; 4];
@@ -131,12 +131,16 @@ pub struct PairFlow {
     /// Flows of the further stages, and the changes of the stage: time since phase 0, and the stage that begins there.
     stages: Vec<PairFlow>,
     schedule: Vec<(f64, usize)>,
+    /// Changes of both displacements along the rigid-body mode, which the second displacement of the gap coordinates measures.
+    pub(crate) rigid_mode: Option<[f64; 2]>,
 }
 
 impl PairFlow {
     /// Computes the flow of a pair.
     pub(crate) fn new(oscillator: &Pair) -> PairFlow {
         let mut flow = PairFlow::in_one_stage(oscillator);
+        let direction = |mode: &RigidMode| [0, 1].map(|i| mode.direction[i]);
+        flow.rigid_mode = oscillator.rigid_modes().modes.first().map(direction);
         if oscillator.schedule.is_empty() {
             return flow;
         }
@@ -242,6 +246,7 @@ impl PairFlow {
             behind: Default::default(),
             stages: Vec::new(),
             schedule: Vec::new(),
+            rigid_mode: None,
         }
     }
 

@@ -44,6 +44,10 @@ impl<'f> PairMeter<'f> {
     pub(crate) fn complete_periods(&mut self, period: u64, sums: &mut Sums) {
         while self.period < period {
             self.fly_to(self.flow.period, sums);
+            if self.schedule.whole.rigid_mode.is_some() {
+                sums.drifts[0].ahead += self.q[2] - sums.drifts[0].rate * self.flow.period;
+                self.q[2] = 0.0;
+            }
             self.t = 0.0;
             let first = self.schedule.restart();
             self.enter_stage(first);
@@ -80,7 +84,8 @@ impl<'f> PairMeter<'f> {
         let mut q = self.q;
         for i in 0..pieces as u64 {
             let (sin, cos) = (flow.omega * (self.t + i as f64 * piece)).sin_cos();
-            q = self.fly_piece(&Piece { linear, q, phasor: [cos, sin], length: piece }, sums);
+            let start = self.t + i as f64 * piece;
+            q = self.fly_piece(&Piece { linear, q, phasor: [cos, sin], length: piece, start }, sums);
         }
         q
     }
@@ -88,21 +93,29 @@ impl<'f> PairMeter<'f> {
     /// Measures a piece of at most one Taylor step, and returns its end.
     fn fly_piece(&self, piece: &Piece<'_>, sums: &mut Sums) -> Gap {
         let mut before = (0.0, piece.q, piece.phasor);
-        self.include(&before.1, sums);
+        self.include(&before.1, piece.start, sums);
         for (share, weight) in nodes() {
             let (q, phasor) = piece.at(share);
-            self.integrate(weight * piece.length, &q, phasor, sums);
+            self.integrate(weight * piece.length, &q, phasor, piece.time(share), sums);
             self.find_extremes(piece, &before, &(share, q, phasor), sums);
             before = (share, q, phasor);
         }
         let (end, phasor) = piece.at(1.0);
-        self.include(&end, sums);
+        self.include(&end, piece.time(1.0), sums);
         self.find_extremes(piece, &before, &(1.0, end, phasor), sums);
         end
     }
 
-    fn integrate(&self, weight: f64, q: &Gap, phasor: Phasor, sums: &mut Sums) {
+    /// Subtracts the drift along the rigid-body mode from displacements at a time since phase 0.
+    fn without_drift(&self, [x1, x2]: [f64; 2], t: f64, sums: &Sums) -> [f64; 2] {
+        let Some([first, second]) = self.schedule.whole.rigid_mode else { return [x1, x2] };
+        let ahead = sums.drifts[0].ahead - sums.drifts[0].rate * t;
+        [x1 + first * ahead, x2 + second * ahead]
+    }
+
+    fn integrate(&self, weight: f64, q: &Gap, phasor: Phasor, t: f64, sums: &mut Sums) {
         let [x1, v1, x2, v2] = self.flow.displacements(*q);
+        let [x1, x2] = self.without_drift([x1, x2], t, sums);
         for (moments, value) in sums.displacements.iter_mut().zip([x1, x2, q[0]]) {
             moments.integrate(weight, value, phasor);
         }
@@ -115,8 +128,9 @@ impl<'f> PairMeter<'f> {
     }
 
     /// Includes a state in the extremes.
-    fn include(&self, q: &Gap, sums: &mut Sums) {
+    fn include(&self, q: &Gap, t: f64, sums: &mut Sums) {
         let [x1, _, x2, _] = self.flow.displacements(*q);
+        let [x1, x2] = self.without_drift([x1, x2], t, sums);
         for (moments, value) in sums.displacements.iter_mut().zip([x1, x2, q[0]]) {
             moments.include(value);
         }
@@ -128,10 +142,14 @@ impl<'f> PairMeter<'f> {
     /// Includes the extremes between two instants of a piece.
     fn find_extremes(&self, piece: &Piece<'_>, from: &Instant, to: &Instant, sums: &mut Sums) {
         for which in 0..4 {
-            let rate = |(_, q, phasor): &Instant| self.rate(which, piece.linear, q, phasor);
+            let drift = match (which, self.schedule.whole.rigid_mode) {
+                (0 | 1, Some(mode)) => mode[which] * sums.drifts[0].rate,
+                _ => 0.0,
+            };
+            let rate = |(_, q, phasor): &Instant| self.rate(which, piece.linear, q, phasor) - drift;
             if rate(from) * rate(to) < 0.0 {
-                let extreme = piece.root(from.0, to.0, rate);
-                self.include(&extreme, sums);
+                let (share, extreme) = piece.root(from.0, to.0, rate);
+                self.include(&extreme, piece.time(share), sums);
             }
         }
     }
@@ -215,7 +233,7 @@ impl<'f> PairMeter<'f> {
             let (begin, end) = (self.q, event.after);
             let middle = [end[0], end[1], 0.5 * (begin[2] + end[2]), 0.5 * (begin[3] + end[3])];
             let (sin, cos) = (self.flow.omega * (self.t + 0.5 * duration)).sin_cos();
-            self.integrate(duration, &middle, [cos, sin], sums);
+            self.integrate(duration, &middle, [cos, sin], self.t + 0.5 * duration, sums);
         } else {
             self.fly_to(event.t, sums);
         }
@@ -230,7 +248,7 @@ impl<'f> PairMeter<'f> {
         self.flow = self.stage.interval(self.interval);
         self.q = event.after;
         self.t = event.t;
-        self.include(&event.after, sums);
+        self.include(&event.after, event.t, sums);
     }
 }
 
@@ -243,6 +261,8 @@ struct Piece<'f> {
     q: Gap,
     phasor: Phasor,
     length: f64,
+    /// Time of its start since phase 0.
+    start: f64,
 }
 
 impl Piece<'_> {
@@ -253,12 +273,18 @@ impl Piece<'_> {
         (expansion.state(v), expansion.phasor(self.linear.turn * v))
     }
 
-    /// Returns the state at a zero of `rate` between two instants at which it has opposite signs.
-    fn root(&self, a: f64, b: f64, rate: impl Fn(&Instant) -> f64) -> Gap {
+    /// Returns the time since phase 0 at a share of the piece.
+    fn time(&self, share: f64) -> f64 {
+        self.start + share * self.length
+    }
+
+    /// Returns share and state at a zero of `rate` between two instants at which it has opposite signs.
+    fn root(&self, a: f64, b: f64, rate: impl Fn(&Instant) -> f64) -> (f64, Gap) {
         let of = |share| {
             let (q, phasor) = self.at(share);
             rate(&(share, q, phasor))
         };
-        self.at(root(a, b, of)).0
+        let share = root(a, b, of);
+        (share, self.at(share).0)
     }
 }

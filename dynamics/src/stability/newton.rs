@@ -45,6 +45,9 @@ const CONVERGED: f64 = 1e-13;
 /// Residual, relative to the state, below which the computed multipliers differ by at most a quarter from the multipliers of the orbit.
 const MULTIPLIER_RESIDUAL: f64 = 1e-3;
 
+/// Largest error of a multiplier that is 1.
+const UNIT_ERROR: f64 = 1e-6;
+
 /// Largest multiplier, at that residual, from which the orbit is certainly unstable.
 const UNSTABLE_EXPANSION: f64 = 1.25;
 
@@ -238,15 +241,17 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     let entry = |i, j| super::in_displacements(scaled[(i, j)], image.rate, i, j);
     let matrix = DMatrix::from_fn(size, size, entry);
     let mut scaled_multipliers = multipliers(&matrix)?;
-    scaled_multipliers.truncate(2 * seed.flow().degrees);
-    // An element that never slides makes a family of cycles along its row, whose multiplier 1 is removed.
-    for _ in 0..image.never_slid {
+    // A shift along a rigid-body mode is undone: it has the multiplier 0. If momentum along the mode is conserved, its rate has the
+    // multiplier 1. An element that never slides makes a family of cycles along its row, with the multiplier 1, too.
+    let (rigid, conserved) = (seed.flow().rigid_modes.modes.len(), seed.flow().rigid_modes.conserved);
+    scaled_multipliers.truncate(2 * seed.flow().degrees - rigid);
+    for _ in 0..conserved + image.never_slid {
         let off = |[re, im]: &[f64; 2]| (re * log_scale.exp() - 1.0).hypot(im * log_scale.exp());
-        let (along, _) =
-            scaled_multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+        let nearest = scaled_multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        let Some((along, _)) = nearest.filter(|(_, of)| rigid == 0 || off(of) < UNIT_ERROR) else { break };
         scaled_multipliers.remove(along);
     }
-    let [re, im] = scaled_multipliers[0];
+    let [re, im] = scaled_multipliers.first().copied().unwrap_or_default();
     let (radius, scale) = (re.hypot(im), log_scale.exp());
     // A radius below the rounding errors of the matrix is not distinguished from zero.
     let is_resolved = radius > f64::EPSILON * matrix.amax();

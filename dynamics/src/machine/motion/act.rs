@@ -246,7 +246,7 @@ impl MachineMotion<'_> {
             interval: 0,
             ends_series: false,
         };
-        observer.event(&event, &|| [self.system.to_state(&self.before), self.state()]);
+        observer.event(&event, &|| [&self.before, &self.point].map(|point| self.unshifted(point)));
     }
 
     /// Counts and reports a change of friction modes.
@@ -267,7 +267,7 @@ impl MachineMotion<'_> {
             symbol,
             period: self.period,
             t: self.clock.time(),
-            at: self.state(),
+            at: self.unshifted(&self.point),
         });
     }
 }

@@ -5,7 +5,7 @@ use crate::machine::domain::Carrier;
 use crate::machine::modes::{AtRest, GapMode, Modes, signed};
 use crate::machine::watch::Roots;
 use crate::machine::{Numbers, System};
-use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
+use crate::model::{Contact, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{Allowance, Clock, Work};
 use crate::motion::{Slip, Slips};
 
@@ -46,6 +46,7 @@ impl<'s> MachineMotion<'s> {
             steps_in_period: 0,
             contact_time: 0.0,
             sticking_time: 0.0,
+            travelled: [0.0; MOST_COORDINATES],
             near_grazing: false,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
