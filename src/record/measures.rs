@@ -59,10 +59,7 @@ pub const GROUPS: [Group; 13] = [
         |of, _| Some(of.quantities?.dissipated))]),
     group("amplitude", 15, true, &[
         number("amplitude", "amplitude of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].amplitude)),
-        number("mean", "mean of {}", Dimension::Length, |of, i| {
-            let of = &of.quantities?.displacements[i];
-            of.drift.is_none().then_some(of.mean)
-        })]),
+        number("mean", "mean of {}", Dimension::Length, |of, i| Some(of.quantities?.displacements[i].mean))]),
     group("rms", 16, true, &[number("rms", "root mean square of {}", Dimension::Length,
         |of, i| Some(of.quantities?.displacements[i].rms))]),
     group("harmonic", 17, true, &[
@@ -240,9 +237,8 @@ impl Group {
                 });
                 return relative(x.hypot(y), b[0].abs() + added);
             }
-            // The mean of the mirror image has the other sign. A displacement that drifts has no mean.
-            let have = a.iter().zip(&b).filter(|(a, b)| !(a.is_nan() && b.is_nan()));
-            let distances = have.map(|(a, b)| relative(apart(a.abs(), b.abs()), b.abs() + added));
+            // The mean of the mirror image has the other sign.
+            let distances = a.iter().zip(&b).map(|(a, b)| relative(apart(a.abs(), b.abs()), b.abs() + added));
             distances.fold(0.0, farther)
         };
         let own = measures.chunks(self.numbers.len()).map(of_subject).fold(0.0, farther);
@@ -250,7 +246,7 @@ impl Group {
         let added = share * largest(&drifts);
         let of_drift = |measure: &Measure| {
             let [a, b] = [a, b].map(|record| record.measures[measure.place].abs());
-            if a.is_nan() && b.is_nan() { 0.0 } else { relative(apart(a, b), b + added) }
+            relative(apart(a, b), b + added)
         };
         drifts.iter().map(of_drift).fold(own, farther)
     }
@@ -522,10 +518,8 @@ impl Record {
                 // The sum turns minus zero into zero, so that columns of zeros take no memory.
                 Some(value) => self.measures.set(measure.place, value + 0.0),
                 None if measure.is_drift() => self.measures.set(measure.place, 0.0),
-                // A signal that is too large takes no other number away, and a displacement that drifts has no mean.
-                None if measure.signal().is_some() || measure.is_odd() && motion.quantities.is_some() => {
-                    self.measures.set(measure.place, f64::NAN);
-                }
+                // A signal that is too large takes no other number away.
+                None if measure.signal().is_some() => self.measures.set(measure.place, f64::NAN),
                 None => self.valid &= !measure.group.bit,
             }
         }

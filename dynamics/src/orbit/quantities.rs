@@ -76,10 +76,10 @@ impl Approaches {
 pub struct Displacement {
     /// Half the difference of maximum and minimum.
     pub amplitude: f64,
-    /// Average over time.
+    /// Average over time; 0 for a displacement that drifts.
     pub mean: f64,
-    /// Mean rate, if a [rigid-body mode](crate::model::RigidMode) shifts the displacement. `mean` is then arbitrary, and all other numbers
-    /// are those of the displacement without drift and mean.
+    /// Mean rate, if a [rigid-body mode](crate::model::RigidMode) shifts the displacement. All other numbers are then those of the
+    /// displacement without drift and mean.
     pub drift: Option<f64>,
     /// Root mean square.
     pub rms: f64,
@@ -201,8 +201,9 @@ impl<'f> Meter<'f> {
                 let of = Displacement::of(&sums.displacements[place], time);
                 let drift = self.flow.drift(place, &sums.drifts);
                 // The position along a rigid-body mode is arbitrary, so the mean is removed.
-                let rms = drift.map_or(of.rms, |_| (of.rms.powi(2) - of.mean.powi(2)).max(0.0).sqrt());
-                Displacement { drift, rms, ..of }
+                let without_mean = || (of.rms.powi(2) - of.mean.powi(2)).max(0.0).sqrt();
+                let [mean, rms] = drift.map_or([of.mean, of.rms], |_| [0.0, without_mean()]);
+                Displacement { mean, drift, rms, ..of }
             }),
             dissipated: sums.dissipated / time,
             friction: self.flow.has_friction().then(|| FrictionQuantities {
