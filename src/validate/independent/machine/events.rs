@@ -348,7 +348,10 @@ impl Flight {
                 meshing.acting[gap] += signed(side, 1);
                 if presses(&self.system.domain(meshing)) {
                     let lasting = if e * approach > 0.0 { Lasting::Begins } else { Lasting::Presses };
-                    return Outcome { key: meshing, y: bounced, lasting: Some(lasting) };
+                    // The rest of a series of impacts is one flight of the same duration and momentum.
+                    let is_series = e * approach > wall.mesh_speed && e < 1.0;
+                    let y = if is_series { after(2.0 * e / (1.0 - e)) } else { bounced };
+                    return Outcome { key: meshing, y, lasting: Some(lasting) };
                 }
             }
         }
