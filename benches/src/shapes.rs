@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Drive, Forces, GapRow, Oscillator, Restitution, Side, Spring, Wall,
+    Contact, Drive, Forces, GapRow, Oscillator, Restitution, Side, Spring, Timing, Wall,
 };
 
 fn counted(n: usize, what: &str) -> String {
@@ -108,6 +108,7 @@ impl Chain {
             gaps: (0..self.gaps).map(gap).collect(),
             friction: Vec::new(),
             signals: Vec::new(),
+            timing: Timing::Forced,
         }
     }
 }

@@ -23,7 +23,7 @@ pub use law::{Contact, Law};
 pub use non_impacting::NonImpacting;
 pub use oscillator::{
     Drive, DryFriction, Forces, GapRow, HIGHEST_ORDER, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS,
-    MOST_HARMONICS, MOST_SIGNALS, MOST_WALLS, Oscillator, Restitution, Signal, Spring, Wall,
+    MOST_HARMONICS, MOST_SIGNALS, MOST_WALLS, Oscillator, Restitution, Signal, Spring, Timing, Wall,
 };
 pub(crate) use pair::is_semidefinite;
 pub use pair::{Domain, Form, Harmonic, OuterWall, Pair, Stage};

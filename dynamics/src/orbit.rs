@@ -22,6 +22,7 @@ mod section;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod unforced;
 
 pub use analysis::{
     CHAOS_ERRORS, ESCAPE_GROWTH, EVENT_PERIODS, LONGEST_WINDOW, NEUTRAL_ORDER, PLAIN_GROWTH, SHARED_GROWTH,
@@ -214,8 +215,10 @@ pub struct Orbit {
     pub slips: Vec<SlipPoint>,
     /// Forcing periods that `events` and `word` span.
     pub cycle_periods: u32,
-    /// The forcing period `T`.
+    /// The forcing period `T`. For a cycle without force, the time of the cycle.
     pub forcing_period: f64,
+    /// Time of a cycle without force; none if the motion is at rest.
+    pub cycle_time: Option<f64>,
     /// Forcing periods that the motion itself was integrated, without Newton searches.
     pub periods_run: u64,
 }

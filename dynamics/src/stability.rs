@@ -14,7 +14,7 @@ mod unit_circle;
 pub use exponent::{CORRELATION_MARGIN, Exponent, FRESH_TANGENT, LEAST_FOR_ERROR, standard_error};
 pub(crate) use matrix::{image_of, norm, times};
 pub use newton::refine;
-pub(crate) use newton::{LARGEST_MULTIPLIER, Newton};
+pub(crate) use newton::{LARGEST_MULTIPLIER, Newton, step_and_time};
 
 use matrix::product;
 use nalgebra::linalg::Schur;

@@ -56,7 +56,7 @@ def map(  # noqa: A001
     quantities
         Some of ``class lyapunov impacts mesh symmetric word pattern impact_speed impact_speed_max impact_energy impact_rate
         contact_force_max contact_force_rms amplitude rms harmonic dissipated multiplier
-        stick_fraction friction_energy release_energy state``; by default class and lyapunov.
+        stick_fraction friction_energy release_energy cycle_time state``; by default class and lyapunov.
         Others are not computed. ``docs/scenes.md`` explains them.
     start
         The start of cells at phase 0: ``"rest"``, ``"up"``, ``"down"``, a state ``[x1, v1, x2, v2]``, or some of its

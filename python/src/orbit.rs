@@ -24,11 +24,19 @@ pub(crate) struct Orbit {
     start: State,
 }
 
+impl Orbit {
+    /// Returns the model with the period of a cycle without force.
+    fn on_cycle(&self) -> Box<dyn rattlemap::model::Model> {
+        let model: &dyn rattlemap::model::Model = &*self.model;
+        model.on_cycle(self.orbit.cycle_time)
+    }
+}
+
 #[pymethods]
 impl Orbit {
     /// Returns the JSON object that `orbit --json` prints.
     fn json(&self) -> String {
-        to_json(&*self.model, &self.orbit, None)
+        to_json(&*self.on_cycle(), &self.orbit, None)
     }
 
     /// Largest Lyapunov exponent. JSON cannot tell that of a superstable cycle, which is minus infinity.
@@ -55,13 +63,13 @@ impl Orbit {
 
     /// Returns `trajectory.csv` with this number of samples per forcing period.
     fn trajectory(&self, py: Python<'_>, samples_per_period: usize) -> PyResult<String> {
-        let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
+        let (model, orbit) = (self.on_cycle(), Arc::clone(&self.orbit));
         worker::run(py, None, move |_| Ok(Some(in_memory::trajectory(&*model, &orbit, samples_per_period)?)))
     }
 
     /// Returns `spectrum.csv`; none if the motion cannot be followed for the required time.
     fn spectrum(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let (model, orbit) = (Arc::clone(&self.model), Arc::clone(&self.orbit));
+        let (model, orbit) = (self.on_cycle(), Arc::clone(&self.orbit));
         worker::run(py, None, move |_| Ok(Some(in_memory::spectrum(&*model, &orbit)?)))
     }
 

@@ -78,6 +78,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
         progress.clear();
     }
     let orbit = orbit?.ok_or_else(stopped)?;
+    let model = model.on_cycle(orbit.cycle_time);
     print(&match arguments.json {
         true => to_json(&*model, &orbit, instant),
         false => broken(&summary(&*model, &orbit, instant)),

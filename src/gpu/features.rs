@@ -2,7 +2,7 @@
 
 use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
 use super::pair::has_negative_preload;
-use rattlemap_dynamics::model::{Contact, Form, Pair, Side};
+use rattlemap_dynamics::model::{Contact, Form, Pair, Side, Timing};
 
 /// The features of one or more oscillators, or the features that a shader supports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -25,6 +25,8 @@ pub struct Features {
     pub machine: Option<MachineShape>,
     /// Machines with more domains than a table can hold.
     pub too_many_domains: bool,
+    /// Machines without force, whose cycles have periods of their own.
+    pub unforced: bool,
 }
 
 impl Features {
@@ -35,6 +37,7 @@ impl Features {
             Form::Machine(machine) => Features {
                 machine: Some(MachineShape::of(&machine)),
                 too_many_domains: domain_count(&machine) > MOST_DOMAINS,
+                unforced: machine.timing != Timing::Forced,
                 ..Features::default()
             },
         }
@@ -53,6 +56,7 @@ impl Features {
             negative_preload: has_negative_preload(pair),
             machine: None,
             too_many_domains: false,
+            unforced: false,
         }
     }
 
@@ -71,6 +75,7 @@ impl Features {
                 (own, others) => own.or(others),
             },
             too_many_domains: self.too_many_domains || other.too_many_domains,
+            unforced: self.unforced || other.unforced,
         }
     }
 
@@ -89,11 +94,12 @@ impl Features {
         self.machine.map_or(4, |shape| shape.dim() + MODES)
     }
 
-    fn without_code(self) -> [(bool, &'static str, &'static str); 2] {
+    fn without_code(self) -> [(bool, &'static str, &'static str); 3] {
         let preload = "a wall that only pushes and has a negative preload";
         [
             (self.too_many_domains, "more than 4096 combinations of modes", "too_many_domains"),
             (self.negative_preload, preload, "negative_preload"),
+            (self.unforced, "motion without force", "unforced"),
         ]
     }
 

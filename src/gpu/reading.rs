@@ -52,7 +52,11 @@ impl LaneResult {
         let mut record = record(constants[self.flow as usize].as_ref(), &self.reading, &self.finding);
         if self.measured.is_some() {
             let (quantities, multiplier) = (self.quantities(constants), self.multiplier(constants));
-            record.set_measures(&measures::Measured { quantities: quantities.as_ref(), multiplier });
+            record.set_measures(&measures::Measured {
+                quantities: quantities.as_ref(),
+                multiplier,
+                cycle_time: None,
+            });
         }
         record
     }

@@ -193,19 +193,24 @@ async fn choose<'p>(
 struct Load {
     /// Number of cells that can be under way together.
     cells: usize,
-    is_machine: bool,
+    is_for_processor: bool,
 }
 
 impl Load {
     fn of(plan: &Plan) -> Load {
-        let is_machine = plan.flow_count() > 0 && matches!(plan.form(0), Form::Machine(_));
+        // Lanes compare positions with their shift along rigid-body modes.
+        let needs_reference = |form| match form {
+            Form::Machine(_) => true,
+            Form::Pair(pair) => !pair.rigid_modes().modes.is_empty(),
+        };
+        let is_for_processor = plan.flow_count() > 0 && needs_reference(plan.form(0));
         let cells = match plan.policy().follows() {
             true => plan.counts()[0],
             // Most cells of an adaptive map are filled.
             false if plan.refine().is_some() => plan.run_count() / REFINED,
             false => plan.run_count(),
         };
-        Load { cells, is_machine }
+        Load { cells, is_for_processor }
     }
 }
 
@@ -243,8 +248,8 @@ enum Preferred {
 }
 
 fn preferred(load: Load, cores: usize, precision: Precision, is_known: bool) -> Preferred {
-    if load.is_machine {
-        let reason = "the processor is faster for models that are not one or two coordinates with one gap";
+    if load.is_for_processor {
+        let reason = "the processor is for models that drift or are not one or two coordinates with one gap";
         return Preferred::Processor(reason.to_owned());
     }
     let least = CELLS_PER_CORE * cores * if precision == Precision::F64 { SLOWER_IN_F64 } else { 1 };
@@ -319,7 +324,7 @@ mod tests {
 
     #[test]
     fn a_card_needs_many_cells() {
-        let map = |cells| Load { cells, is_machine: false };
+        let map = |cells| Load { cells, is_for_processor: false };
         let choose = |load, cores, precision, is_known| preferred(load, cores, precision, is_known);
         let small = choose(map(10_000), 16, Precision::F32, true);
         let Preferred::Processor(reason) = small else { panic!("{small:?}") };
@@ -329,7 +334,7 @@ mod tests {
         // Fewer cores take longer; f64 needs more cells.
         assert!(matches!(choose(map(50_000), 2, Precision::F32, true), Preferred::Card(_)));
         assert!(matches!(choose(map(50_000), 2, Precision::F64, true), Preferred::Processor(_)));
-        let machine = Load { is_machine: true, ..map(1 << 24) };
+        let machine = Load { is_for_processor: true, ..map(1 << 24) };
         assert!(matches!(choose(machine, 1, Precision::F32, true), Preferred::Processor(_)));
         assert!(is_known("NVIDIA H200") && !is_known("NVIDIA GH200"));
     }

@@ -3,7 +3,7 @@
 use rattlemap_dynamics::model::Model;
 
 use crate::job::model_engine;
-use crate::model_file::{FileModel, Wall, letters_in_words};
+use crate::model_file::{Clock, FileModel, Wall, letters_in_words};
 use crate::show::symbols::with_unit;
 
 /// Returns the name and a summary of every built-in model.
@@ -25,8 +25,15 @@ pub fn page(model: &FileModel) -> String {
     let units = model.units();
     let state = model.state_names().into_iter().enumerate();
     let state: Vec<String> = state.map(|(i, name)| with_unit(name, units.component(i).as_deref())).collect();
-    let frequency = definition.motion.frequency.text();
-    text += &format!("    state {}; forcing period 2 pi over {frequency}\n", state.join(", "));
+    let clock = match &definition.motion.clock {
+        Clock::Frequency(frequency) if definition.motion.is_unforced => {
+            format!("no force; the clock of budgets has the period 2 pi over {}", frequency.text())
+        }
+        Clock::Frequency(frequency) => format!("forcing period 2 pi over {}", frequency.text()),
+        Clock::TimeScale(time) => format!("no force; the clock of budgets has the period {}", time.text()),
+        Clock::Natural => "no force; the clock of budgets has the slowest natural period".to_owned(),
+    };
+    text += &format!("    state {}; {clock}\n", state.join(", "));
     if let Some(letters) = letters_in_words(model) {
         text += &format!("    {letters}\n");
     }

@@ -24,7 +24,7 @@ use thiserror::Error;
 pub(crate) use start::followed;
 
 use crate::map::scene::{Axis, Points, Quantity, Refine, Scene, Start, Steps};
-use crate::model_file::several_gaps;
+use crate::model_file::{is_unforced, several_gaps};
 use crate::record::measures::Group;
 use crate::record::{Record, Records, valid};
 use rattlemap_dynamics::model::{Form, Law, Model, ModelError, Oscillator, State};
@@ -98,11 +98,13 @@ impl Needs {
         quantities.iter().filter_map(|quantity| quantity.group()).any(|group| self.has(group))
     }
 
-    /// Whether the motion must be measured: for all measured quantities but the multiplier, which is known for a cycle, and for the
-    /// contacts of each of several gaps.
+    /// Whether the motion must be measured: for all measured quantities but the multiplier and the time of a cycle, which are known for a
+    /// cycle, and for the contacts of each of several gaps.
     pub fn measures_motion(&self) -> bool {
-        let multiplier = Quantity::Multiplier.group().map_or(0, |group| group.bit);
-        self.gaps || self.measures & !multiplier != 0
+        let known = [Quantity::Multiplier, Quantity::CycleTime];
+        let known =
+            known.iter().filter_map(|quantity| quantity.group()).fold(0, |bits, group| bits | group.bit);
+        self.gaps || self.measures & !known != 0
     }
 }
 
@@ -164,6 +166,9 @@ impl Plan {
         needs.impacts |= needs_contact;
         needs.mesh |= needs_contact;
         needs.gaps = has_several_gaps && (needs.impacts || needs.mesh);
+        if is_unforced(scene.base()) {
+            needs.measures |= Quantity::CycleTime.group().map_or(0, |group| group.bit);
+        }
         let integration = scene.integration();
         Plan {
             flows: Parts::flows(&points),

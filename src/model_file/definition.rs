@@ -1,15 +1,17 @@
 //! The contents of a model file, and the oscillator and contact law that it defines.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
     self, Drive, Forces, GapRow, Law, MOST_FRICTION, Model, ModelError, Oscillator, OscillatorError,
-    Parameter, Restitution, Shapes, Side, Spring,
+    Parameter, Restitution, Shapes, Side, Spring, Timing,
 };
 
 use super::contact::{self, Wall, WallLaw, WallSpring};
 use super::entry::{Names, Staged};
 use super::friction::{self, DryFriction};
-use super::motion::{self, MotionTable};
+use super::motion::{self, Clock, MotionTable};
 use super::signal::{self, Signal};
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
@@ -283,6 +285,12 @@ impl Definition {
         self.oscillator(&self.defaults).is_ok_and(|oscillator| oscillator.needs_machine().is_none())
     }
 
+    /// Whether the file states no force, harmonics or stages. Waves of signals have the period of a forcing, too.
+    pub(super) fn is_unforced(&self) -> bool {
+        let mut waves = self.signals.iter().flat_map(|signal| &signal.constants[1..]);
+        self.motion.is_unforced && waves.all(|wave| wave.as_number() == Some(0.0))
+    }
+
     /// Returns the index of the gap whose first walls have these positions at the defaults; 0 if there is none.
     fn gap_between(&self, walls: [f64; 2]) -> usize {
         let at = |wall: &Wall| wall.at.evaluate(&|index| self.defaults[index]);
@@ -329,8 +337,8 @@ impl Definition {
             })
         };
         let phases: Vec<f64> = motion.stages.iter().map(|phase| values.of(phase)).collect();
-        Ok(Oscillator {
-            omega: values.of(&motion.frequency),
+        let oscillator = Oscillator {
+            omega: 1.0,
             mass: values.matrix(&motion.mass, |entry| entry),
             stages: (0..stages).map(forces).collect(),
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
@@ -338,7 +346,14 @@ impl Definition {
             gaps: (0..motion.gaps.len()).map(gap).collect::<Result<_, OscillatorError>>()?,
             friction: self.friction.iter().map(|own| own.evaluated(|entry| values.of(entry))).collect(),
             signals,
-        })
+            timing: if self.is_unforced() { Timing::Free } else { Timing::Forced },
+        };
+        let omega = match &motion.clock {
+            Clock::Frequency(frequency) => values.of(frequency),
+            Clock::TimeScale(time) => TAU / values.of(time),
+            Clock::Natural => oscillator.slowest_natural_frequency().unwrap_or(TAU),
+        };
+        Ok(Oscillator { omega, ..oscillator })
     }
 
     /// Returns the law of a pair for values of the parameters, and 0 for a machine. It may be asked for millions of cells, so that it does

@@ -201,7 +201,8 @@ fn rates(motion: &MotionTable) -> [Vec<String>; 3] {
 
 /// Returns the cosine and the sine of a harmonic with these factors.
 fn waves(motion: &MotionTable, order: u32, [cos, sin]: [&Expression; 2]) -> [Option<String>; 2] {
-    let phase = phase(&motion.frequency, order);
+    let Some(frequency) = motion.clock.entry() else { return [None, None] };
+    let phase = phase(frequency, order);
     [product(cos, &format!("cos({phase})")), product(sin, &format!("sin({phase})"))]
 }
 

@@ -29,6 +29,7 @@ pub use definition::Definition;
 pub use entry::Staged;
 pub use friction::DryFriction;
 pub use harmonic::HarmonicForce;
+pub use motion::Clock;
 pub use signal::Signal;
 
 use crate::record::measures::{self, Subjects};
@@ -40,6 +41,7 @@ pub struct FileModel {
     definition: Arc<Definition>,
     values: Vec<f64>,
     start_phase: f64,
+    cycle_time: Option<f64>,
 }
 
 impl FileModel {
@@ -111,7 +113,12 @@ impl FileModel {
     }
 
     fn new(definition: Definition) -> FileModel {
-        FileModel { values: definition.defaults.clone(), definition: Arc::new(definition), start_phase: 0.0 }
+        FileModel {
+            values: definition.defaults.clone(),
+            definition: Arc::new(definition),
+            start_phase: 0.0,
+            cycle_time: None,
+        }
     }
 }
 
@@ -206,11 +213,17 @@ pub fn several_gaps(model: &dyn Model) -> Option<Vec<String>> {
     (symbols.len() > 1).then(|| symbols.into_iter().map(|[gap, _]| gap).collect())
 }
 
-/// Models are equal if their texts, values and start phases are.
+/// Whether a model's file states no force, harmonics or stages, so that cycles have periods of their own.
+pub fn is_unforced(model: &dyn Model) -> bool {
+    model.downcast_ref::<FileModel>().is_some_and(|model| model.definition.is_unforced())
+}
+
+/// Models are equal if their texts, values, start phases and cycle times are.
 impl PartialEq for FileModel {
     fn eq(&self, other: &FileModel) -> bool {
         self.values == other.values
             && self.start_phase == other.start_phase
+            && self.cycle_time == other.cycle_time
             && self.definition == other.definition
     }
 }
@@ -229,7 +242,7 @@ impl Model for FileModel {
     }
 
     fn frequency(&self) -> Vec<usize> {
-        self.definition.motion.frequency.uses().to_vec()
+        self.definition.motion.clock.entry().map_or(Vec::new(), |entry| entry.uses().to_vec())
     }
 
     fn parameters(&self) -> &[Parameter] {
@@ -247,6 +260,7 @@ impl Model for FileModel {
     fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
         let oscillator = self.definition.oscillator(&self.values)?.at_phase(self.start_phase);
+        let oscillator = oscillator.on_cycle(self.cycle_time);
         oscillator.validate()?;
         Ok(oscillator)
     }
@@ -257,6 +271,10 @@ impl Model for FileModel {
 
     fn start_phase(&self) -> f64 {
         self.start_phase
+    }
+
+    fn set_cycle_time(&mut self, time: f64) {
+        self.cycle_time = self.definition.is_unforced().then_some(time);
     }
 
     fn set_start_phase(&mut self, phase: f64) -> bool {

@@ -11,9 +11,9 @@ use rattlemap_dynamics::model::{MOST_CHANGES, MOST_COORDINATES, MOST_GAPS, MOST_
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 17] = [
+const MOTION_KEYS: [&str; 18] = [
     "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
-    "stages", "repeat", "gap", "units", "gap_unit", "time_unit", "force_unit",
+    "time_scale", "stages", "repeat", "gap", "units", "gap_unit", "time_unit", "force_unit",
 ];
 
 /// Limits of all models, for messages.
@@ -32,6 +32,27 @@ pub struct Gap {
     pub name: Option<String>,
     /// Factors of the displacements.
     pub row: Vec<Expression>,
+}
+
+/// What sets the forcing period.
+#[derive(Clone, Debug)]
+pub enum Clock {
+    /// Excitation frequency.
+    Frequency(Expression),
+    /// Period of the clock of a model without force.
+    TimeScale(Expression),
+    /// The slowest natural period of a model without force.
+    Natural,
+}
+
+impl Clock {
+    /// Returns the entry of the file.
+    pub fn entry(&self) -> Option<&Expression> {
+        match self {
+            Clock::Frequency(entry) | Clock::TimeScale(entry) => Some(entry),
+            Clock::Natural => None,
+        }
+    }
 }
 
 /// Free motion and its gaps.
@@ -57,8 +78,8 @@ pub struct MotionTable {
     pub harmonics: Vec<HarmonicForce>,
     /// Constant load.
     pub load: Vec<Staged>,
-    /// Excitation frequency.
-    pub frequency: Expression,
+    /// The unit of time of budgets: the forcing period, or a time that a model without force chooses.
+    pub clock: Clock,
     /// Phases at which the stages begin, in turns; empty without stages.
     pub stages: Vec<Expression>,
     /// How often the stages recur in a forcing period.
@@ -67,6 +88,8 @@ pub struct MotionTable {
     pub gaps: Vec<Gap>,
     /// Units of coordinates, gap, time and contact forces.
     pub units: Units,
+    /// Whether the file states no force, harmonics or stages.
+    pub is_unforced: bool,
 }
 
 impl MotionTable {
@@ -87,7 +110,7 @@ impl MotionTable {
         let vectors = [&self.force, &self.force_sin, &self.stages].into_iter();
         let rows = self.gaps.iter().map(|gap| &gap.row);
         let constant = vectors.chain(rows).chain(&self.mass).chain(harmonics).flatten();
-        staged.flat_map(Entry::values).chain(constant).chain([&self.frequency])
+        staged.flat_map(Entry::values).chain(constant).chain(self.clock.entry())
     }
 }
 
@@ -136,16 +159,21 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<MotionTable, 
     let names = Names { stages: stages.len(), ..names };
     let mass = section.require("mass", "write the matrix, such as mass = [[\"m\"]]")?;
     let gaps = read_gaps(&section, names, count)?;
+    let harmonics = harmonic::read(root, names, count)?;
+    let is_unforced = section.get("force").or_else(|| section.get("force_sin")).is_none()
+        && harmonics.is_empty()
+        && stages.is_empty();
     Ok(MotionTable {
+        is_unforced,
         units: read_units(&section, count, &gaps)?,
         mass: names.matrix(&mass, count)?,
         damping: names.matrix_or_zeros(&section, "damping", count)?,
         stiffness: names.matrix_or_zeros(&section, "stiffness", count)?,
         force: names.vector_or_zeros(&section, "force", count)?,
         force_sin: names.vector_or_zeros(&section, "force_sin", count)?,
-        harmonics: harmonic::read(root, names, count)?,
+        harmonics,
         load: names.vector_or_zeros(&section, "load", count)?,
-        frequency: read_frequency(&section, names)?,
+        clock: read_clock(&section, names, is_unforced)?,
         stages,
         repeat,
         gaps,
@@ -220,18 +248,28 @@ fn read_units(section: &Section<'_>, count: usize, gaps: &[Gap]) -> Result<Units
     Ok(Units { coordinates, gap: given.or(common), time, force, signals: Vec::new() })
 }
 
-fn read_frequency(section: &Section<'_>, names: Names<'_>) -> Result<Expression, SceneError> {
-    let field = section.require(
-        "frequency",
-        "name it, such as frequency = \"omega\"; without a force any value works, such as 1",
-    )?;
-    match field.node.value {
+fn read_clock(section: &Section<'_>, names: Names<'_>, is_unforced: bool) -> Result<Clock, SceneError> {
+    let (scale, frequency) = (section.get("time_scale"), section.get("frequency"));
+    if let Some(field) = scale {
+        let other = match (is_unforced, frequency) {
+            (false, _) => "with a force or stages, the forcing period is the clock; remove it",
+            (true, Some(_)) => "`frequency` sets the same clock; remove one of them",
+            (true, None) => return Ok(Clock::TimeScale(names.entry(&field)?)),
+        };
+        return Err(field.conflict(other.to_owned()));
+    }
+    if is_unforced && frequency.is_none() {
+        return Ok(Clock::Natural);
+    }
+    let field = section.require("frequency", "name it, such as frequency = \"omega\"")?;
+    let entry = match field.node.value {
         Value::List(_) => Err(field.wrong_type(
             "one entry, the frequency of the first harmonic, force cos(frequency t) + force_sin sin(frequency t); write \
              multiples of it as [[harmonic]]",
         )),
         _ => names.entry(&field),
-    }
+    };
+    entry.map(Clock::Frequency)
 }
 
 /// Reads the phases at which stages begin, and how often these recur.

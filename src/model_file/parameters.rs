@@ -24,12 +24,12 @@ const LONGEST_UNIT: usize = 20;
 /// Names of columns that stand beside parameters or states in tables. They cannot be names in models. `docs/models.md`
 /// lists them.
 #[rustfmt::skip]
-pub(super) const COLUMNS: [&str; 48] = [
+pub(super) const COLUMNS: [&str; 49] = [
     "i", "j", "t", "phase", "class", "period", "lyapunov", "lyapunov_error", "impacts_per_period", "mesh_fraction",
     "symmetric", "word", "pattern", "status", "periods_run", "source", "finished", "attractor", "attractors", "label",
     "exponent", "largest_multiplier", "cells", "share", "direction", "domain", "event", "side", "kind", "moment",
     "t_mod_period", "impact_speed", "impact_speed_max", "impact_energy", "impact_rate", "contact_force_max",
-    "contact_force_rms", "dissipated", "stick_fraction", "friction_energy", "release_energy", "multiplier", "multiplier_argument", "amplitude_gap", "mean_gap", "rms_gap",
+    "contact_force_rms", "dissipated", "stick_fraction", "friction_energy", "release_energy", "cycle_time", "multiplier", "multiplier_argument", "amplitude_gap", "mean_gap", "rms_gap",
     "harmonic_gap", "harmonic_phase_gap",
 ];
 

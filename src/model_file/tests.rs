@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
     self, Contact, Domain, Drive, DryFriction, Forces, GapRow, Harmonic, Model, Pair, Range, Restitution,
-    Shapes, Side, Spring,
+    Shapes, Side, Spring, Timing,
 };
 
 use super::*;
@@ -54,6 +54,7 @@ mass = [["m", "0.5"], ["0.5", "1"]]
 damping = [["c", "-c"], ["-c", "c + d"]]
 stiffness = [["k", "-k"], ["-k", "k+1"]]
 frequency = "1.5"
+force = [0, 0]
 gap = ["1", "-2"]
 
 [[contact]]
@@ -205,7 +206,8 @@ F = 1.5 | x = 1.5\nF = 1.5 | `x` is already the name of
 "stop" | "a b" | m.toml:1:8: `name = "a b"` is out of range
 name = "stop" | | m.toml:1:1: `name` is missing
 [motion] | [movement] | unknown field `movement = { ... }`; valid names: name, title
-frequency = "omega"\n | | `motion.frequency` is missing; name it, such as frequency = "omega"; without a force any value works
+frequency = "omega"\n | | `motion.frequency` is missing; name it, such as frequency = "omega"
+gap = [1] | gap = [1]\ntime_scale = 2 | `motion.time_scale = 2` does not fit: with a force or stages, the forcing period is the clock; remove it
 mass = [["1"]]\n | | m.toml:13:2: `motion.mass` is missing
 "#,
     );
@@ -723,6 +725,7 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
         gaps: vec![GapRow { row: row(1.0), walls: [vec![], vec![]] }],
         friction: vec![DryFriction { row: row(1.0), force: 1.5, speed: 0.0 }],
         signals: Vec::new(),
+        timing: Timing::Forced,
     };
     assert_eq!(model.oscillator().unwrap(), by_hand);
     assert_eq!(
@@ -911,6 +914,7 @@ fn a_model_of_three_coordinates_and_two_gaps_is_a_machine() {
         ],
         friction: vec![DryFriction { row: row([0.0, 0.0, 2.0]), force: 0.2 * 3.0, speed: 0.8 }],
         signals: Vec::new(),
+        timing: Timing::Forced,
     };
     assert_eq!(machine(&model), by_hand);
     assert_eq!((by_hand.degrees(), by_hand.omega), (3, 1.5));

@@ -104,19 +104,27 @@ pub const STROBE: usize = 4;
 /// Number of groups with a field of their own.
 const GROUP_FIELDS: usize = 12;
 
+/// Place of the time of a cycle in the last field.
+const LAST: usize = 1 + MEASURES - OF_SIGNALS;
+
 /// All fields in the order of files. The last but two has the measured quantities of displacements and gaps that oscillators of at most
 /// two coordinates with one gap do not have, the next one those of each of several gaps. The last one has the only number of the last
-/// group, those of signals, and drifts.
+/// group but one, those of signals, drifts, and the time of a cycle.
 pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
     let further = field!("further_displacements", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
     let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUP_FIELDS + 3];
     let mut i = fields.len() - 1;
-    fields[i] =
-        field!("release_energy_signals_and_drifts", 1 + MEASURES - OF_SIGNALS, 8, |record, nth| record
-            .measures[match nth {
+    // Not a block, which would be a copy of the number.
+    fields[i] = field!(
+        "release_energy_signals_drifts_and_cycle_time",
+        2 + MEASURES - OF_SIGNALS,
+        8,
+        |record, nth| record.measures[match nth {
             0 => places_before(GROUP_FIELDS),
+            LAST => places_before(GROUP_FIELDS + 1),
             nth => OF_SIGNALS + nth - 1,
-        }]);
+        }]
+    );
     i -= 1;
     fields[i] = Field { name: "gaps", first: OF_GAPS, count: OF_SIGNALS - OF_GAPS, ..further };
     i = 0;
@@ -135,7 +143,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
 
 impl Record {
     /// Number of bytes in messages to and from pages.
-    pub const BYTES: usize = 1176;
+    pub const BYTES: usize = 1184;
 
     /// Returns the bytes of all fields, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {

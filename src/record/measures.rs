@@ -44,7 +44,7 @@ pub(crate) const GAP_GROUPS: [Group; 5] = [
 
 /// Quantities that a scene requests by one name, in the order of their places in a record.
 #[rustfmt::skip]
-pub const GROUPS: [Group; 13] = [
+pub const GROUPS: [Group; 14] = [
     group("impact_speed", 9, false, &[number("impact_speed", "mean approach speed of impacts", Dimension::Speed,
         |of, _| of.impacts()?.approaches.get(2).map(|both| both.mean))]),
     group("impact_speed_max", 10, false, &[number("impact_speed_max", "largest approach speed of impacts", Dimension::Speed,
@@ -75,6 +75,7 @@ pub const GROUPS: [Group; 13] = [
         |of, _| Some(of.quantities?.friction?.dissipated))]),
     group("release_energy", 22, false, &[number("release_energy", "energy that walls with `pull = false` still hold when contact ends, per unit time",
         Dimension::Power, |of, _| of.quantities?.release_energy)]),
+    group("cycle_time", 23, false, &[number("cycle_time", "time of a cycle", Dimension::Time, |of, _| of.cycle_time)]),
 ];
 
 /// Physical dimension of a number, from which its unit follows.
@@ -88,6 +89,8 @@ pub enum Dimension {
     Force,
     /// Energy per time.
     Power,
+    /// Time.
+    Time,
     /// One per time.
     Rate,
     /// Angle in radians, from minus pi to pi.
@@ -479,6 +482,8 @@ pub struct Measured<'a> {
     pub quantities: Option<&'a Quantities>,
     /// Modulus and argument of the largest multiplier.
     pub multiplier: Option<[f64; 2]>,
+    /// Time of a cycle without force.
+    pub cycle_time: Option<f64>,
 }
 
 impl<'a> Measured<'a> {
@@ -497,7 +502,8 @@ impl<'a> Measured<'a> {
 
 impl<'a> From<&'a Measurement> for Measured<'a> {
     fn from(measurement: &'a Measurement) -> Self {
-        Measured { quantities: measurement.quantities.as_ref(), multiplier: measurement.multiplier }
+        let Measurement { multiplier, cycle_time, .. } = *measurement;
+        Measured { quantities: measurement.quantities.as_ref(), multiplier, cycle_time }
     }
 }
 
@@ -505,7 +511,8 @@ impl<'a> From<&'a Orbit> for Measured<'a> {
     fn from(orbit: &'a Orbit) -> Self {
         let polar = |&[re, im]: &[f64; 2]| [re.hypot(im), im.atan2(re)];
         let largest = orbit.floquet.as_ref().and_then(|multipliers| multipliers.first());
-        Measured { quantities: orbit.quantities.as_ref(), multiplier: largest.map(polar) }
+        let (multiplier, cycle_time) = (largest.map(polar), orbit.cycle_time);
+        Measured { quantities: orbit.quantities.as_ref(), multiplier, cycle_time }
     }
 }
 
@@ -534,11 +541,16 @@ impl Record {
         }
     }
 
-    /// Sets all measured quantities but the multiplier.
+    /// Sets all measured quantities but the multiplier and the time of a cycle.
     pub fn set_quantities(&mut self, quantities: Option<&Quantities>) {
         let mut parts = all().filter(|measure| measure.group.name == "multiplier").map(|part| part.of(self));
         let multiplier = parts.next().flatten().zip(parts.next().flatten()).map(<[f64; 2]>::from);
-        self.set_measures(&Measured { quantities, multiplier });
+        self.set_measures(&Measured { quantities, multiplier, cycle_time: self.cycle_time() });
+    }
+
+    /// Returns the time of a cycle without force.
+    pub fn cycle_time(&self) -> Option<f64> {
+        all().find(|measure| measure.group.name == "cycle_time").and_then(|measure| measure.of(self))
     }
 
     /// Removes the numbers of some quantities. Those of gaps are removed with their quantity.
@@ -605,7 +617,11 @@ mod tests {
         let quantities = Quantities { impact_energy: -0.0, dissipated: 2.0, ..Quantities::default() };
         let mut record =
             Record { measures: [7.0; MEASURES].into(), valid: valid::PERIOD, ..Record::default() };
-        record.set_measures(&Measured { quantities: Some(&quantities), multiplier: Some([0.5, f64::NAN]) });
+        record.set_measures(&Measured {
+            quantities: Some(&quantities),
+            multiplier: Some([0.5, f64::NAN]),
+            cycle_time: None,
+        });
         let value = |name: &str| Group::named(name).unwrap().measures().next().unwrap().of(&record);
         let absent = ["impact_speed", "impact_speed_max", "contact_force_max", "multiplier"];
         assert_eq!(absent.map(value), [None; 4]);

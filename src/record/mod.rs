@@ -59,7 +59,7 @@ pub mod valid {
 
 /// Results of one cell, in one fixed layout for all engines, precisions and variants.
 ///
-/// 392 bytes for models of one or two coordinates with one gap. Those of larger models have further strobe states and measured quantities
+/// 408 bytes for models of one or two coordinates with one gap. Those of larger models have further strobe states and measured quantities
 /// in memory of their own. Files contain the entries of the strobe state that the model has, but four at least: 376 bytes for one or
 /// two coordinates, and 16 more for each further one; 320 bytes of measured quantities only of models with more displacements or gaps; and
 /// 120 bytes of contacts of each gap only of models with several gaps.

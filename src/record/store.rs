@@ -62,7 +62,7 @@ impl<R: AsRef<[Record]> + AsMut<[Record]> + Debug + Sync + ?Sized> RecordsMut fo
 /// A fixed number of records, stored by column.
 ///
 /// A column that is zero in all records takes no memory, and equal words are stored once. A map of classes and
-/// exponents takes 24 bytes per run; a [`Record`] takes 392. Records come back to the bit, but for strobe states,
+/// exponents takes 24 bytes per run; a [`Record`] takes 408. Records come back to the bit, but for strobe states,
 /// which are stored on request only.
 #[derive(Clone, Debug)]
 pub struct RecordStore {

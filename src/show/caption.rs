@@ -1,9 +1,9 @@
 //! Descriptions of parameters, starts and integration in figures and the report.
 
 use crate::map::scene::{Scene, Start};
-use crate::model_file::FileModel;
+use crate::model_file::{FileModel, is_unforced};
 use crate::show::symbols::{equation, number, symbol};
-use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::model::{Model, Parameter, State, Timing};
 
 /// Describes an oscillator: values of parameters without a default, the frequency, values that differ from the defaults, and
 /// whether all others have their defaults; then the start phase if it is not 0. For a user's model it lists all values, because
@@ -94,8 +94,10 @@ pub(crate) fn integration(scene: &Scene) -> String {
         Some(_) => "; refined at borders, the rest filled and audited",
         None => "",
     };
+    let timing = if is_unforced(scene.base()) { Timing::Free } else { Timing::Forced };
+    let [_, periods] = timing.names();
     format!(
-        "every cell {start}{more_starts}, {upper}{transient} + {observed} forcing periods{more}{confirmed}{filled}"
+        "every cell {start}{more_starts}, {upper}{transient} + {observed} {periods}{more}{confirmed}{filled}"
     )
 }
 

@@ -286,6 +286,9 @@ impl<'a> Cells<'a> {
     pub(crate) fn impact_rate(&self, id: usize) -> Option<f64> {
         let record = self.record(id);
         let is_shown = self.shows_averages(&record) && record.valid & valid::IMPACTS != 0;
+        if let Some(time) = record.cycle_time() {
+            return is_shown.then_some(record.impacts_per_period / time);
+        }
         let omega = || self.plan.model(id as u32).oscillator().ok().map(|oscillator| oscillator.omega);
         Some(record.impacts_per_period * is_shown.then(omega)?? / TAU)
     }

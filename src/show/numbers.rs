@@ -108,6 +108,7 @@ fn unit(number: &Number, units: &Units) -> Option<String> {
         (Dimension::Length | Dimension::Speed, Some(component)) => units.component(component),
         (Dimension::Length, None) => units.gap.clone(),
         (Dimension::Speed, None) => units.gap_velocity(),
+        (Dimension::Time, _) => units.time.clone(),
         (Dimension::Rate, _) => units.rate("1"),
         (Dimension::Angle, _) => Some("rad".to_owned()),
         (Dimension::Force, _) => units.force.clone(),

@@ -34,9 +34,10 @@ fn approaches(orbit: &Orbit, side: Side) -> Option<[f64; 2]> {
 }
 
 /// Lines of a summary: their quantities, each with the word before its numbers.
-const LINES: [(&str, &[(Quantity, &str)]); 9] = [
+const LINES: [(&str, &[(Quantity, &str)]); 10] = [
     ("impact speed", &[(Quantity::ImpactSpeed, "mean"), (Quantity::ImpactSpeedMax, "largest")]),
     ("contact force", &[(Quantity::ContactForceMax, "largest"), (Quantity::ContactForceRms, "rms")]),
+    ("cycle", &[(Quantity::CycleTime, "time")]),
     (
         "per unit time",
         &[

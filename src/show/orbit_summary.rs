@@ -8,7 +8,7 @@ use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::symbols::with_unit;
-use rattlemap_dynamics::model::{Model, Parameter, State};
+use rattlemap_dynamics::model::{Model, Parameter, State, Timing};
 use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, SlipPoint, Status};
 
@@ -29,9 +29,10 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
     if orbit.class == Class::Failed {
         return text;
     }
+    let [one, several] = timing(model).names();
     let span = match orbit.cycle_periods {
-        1 => "1 forcing period".to_owned(),
-        periods => format!("{periods} forcing periods"),
+        1 => format!("1 {one}"),
+        periods => format!("{periods} {several}"),
     };
     let units = model.units();
     let _ = writeln!(
@@ -59,7 +60,7 @@ pub fn history_summary(
     let mut facts = vec![
         ("parameters", parameters(model)),
         ("start", state(model, Instant { time: 0.0, state: *start })),
-        ("forcing periods", {
+        (timing(model).names()[1], {
             let period = with_unit(&significant(history.forcing_period), model.units().time.as_deref());
             format!("{first} to {last} (T = {period})")
         }),
@@ -88,6 +89,23 @@ fn state(model: &dyn Model, instant: Instant) -> String {
     format!("{} at t = {:?}", values.join(" "), instant.time)
 }
 
+/// Returns what the period of a model is.
+fn timing(model: &dyn Model) -> Timing {
+    model.oscillator().map_or(Timing::Forced, |oscillator| oscillator.timing)
+}
+
+/// Names the multipliers that a list leaves out.
+fn without_shifts(model: &dyn Model) -> String {
+    let in_place = model.oscillator().is_ok_and(|oscillator| !oscillator.rigid_modes().modes.is_empty());
+    let shifts = [(in_place, "in place"), (timing(model) == Timing::Cycle, "in time")];
+    let left_out: Vec<&str> = shifts.into_iter().filter_map(|(is_so, what)| is_so.then_some(what)).collect();
+    if left_out.is_empty() {
+        String::new()
+    } else {
+        format!("; without that of a shift {}", left_out.join(" and "))
+    }
+}
+
 /// Returns labels and values of the lines before the events.
 fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     let mut facts = Vec::new();
@@ -96,7 +114,8 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     if model.start_phase() != 0.0 {
         add("start phase", format!("{:?} rad", model.start_phase()));
     }
-    add("class", class(orbit));
+    let rests = timing(model) == Timing::Free && matches!(orbit.class, Class::Periodic { .. });
+    add("class", class(orbit, timing(model).names()[1]) + if rests { ": it comes to rest" } else { "" });
     let text = match orbit.class {
         Class::Undecided if orbit.status == Status::Slow => "slow: more periods may decide the class",
         _ => status(orbit.status),
@@ -125,7 +144,7 @@ fn facts(model: &dyn Model, orbit: &Orbit) -> Vec<(String, String)> {
     add("Lyapunov exponent", exponent(orbit));
     if let Some(multipliers) = &orbit.floquet {
         let listed: Vec<String> = multipliers.iter().copied().map(complex).collect();
-        add("Floquet multipliers", listed.join(", "));
+        add("Floquet multipliers", listed.join(", ") + &without_shifts(model));
     }
     if let Some(symmetric) = orbit.symmetric {
         let text = match (symmetric, has_mirror_images(model)) {
@@ -155,11 +174,11 @@ fn parameters(model: &dyn Model) -> String {
     all.map(text).collect::<Vec<_>>().join(" ")
 }
 
-fn class(orbit: &Orbit) -> String {
+fn class(orbit: &Orbit, periods: &str) -> String {
     match orbit.class {
         Class::Periodic { period } => format!("periodic, period {period}"),
         Class::Undecided => {
-            format!("undecided: neither periodic nor chaotic within {} forcing periods", orbit.periods_run)
+            format!("undecided: neither periodic nor chaotic within {} {periods}", orbit.periods_run)
         }
         other => other.name().to_owned(),
     }

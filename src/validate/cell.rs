@@ -45,6 +45,8 @@ pub(super) struct Cell<'a> {
     pub(super) record: Record,
     model: Box<dyn Model>,
     pub(super) flow: Box<Flow>,
+    /// The flow of the map, if `flow` has the period of the cell's cycle without force.
+    clock: Option<Box<Flow>>,
     pub(super) law: Law,
     pub(super) start: State,
     budget: Budget,
@@ -70,11 +72,15 @@ impl<'a> Cell<'a> {
     pub(super) fn new(subject: &Subject<'a>, id: u32, halt: &'a AtomicBool) -> Cell<'a> {
         let plan = subject.plan;
         let cell = plan.cell(id);
-        let flow = Box::new(Flow::new(plan.form(cell.flow)));
+        let record = subject.records.record(id as usize);
+        let time = record.cycle_time();
+        let form = plan.form(cell.flow);
+        let clock = time.map(|_| Box::new(Flow::new(&form)));
+        let flow = Box::new(Flow::new(form.on_cycle(time)));
         let budget = *plan.budget();
         Cell {
-            record: subject.records.record(id as usize),
-            model: plan.model(id),
+            record,
+            model: plan.model(id).on_cycle(time),
             law: plan.law(cell.law),
             start: plan.start(id, subject.records),
             budget,
@@ -83,6 +89,7 @@ impl<'a> Cell<'a> {
             resolution: resolution(subject.precision),
             seed: u64::from(id) << 32,
             flow,
+            clock,
             halt,
         }
     }
@@ -119,7 +126,8 @@ impl<'a> Cell<'a> {
 
     /// Computes the cell with the reference and early stops, as an engine does.
     pub(super) fn again(&self, needs: &Needs) -> Record {
-        let measured = measure_until(&self.flow, self.law, self.start, &self.budget, self.halt);
+        let flow = self.clock.as_ref().unwrap_or(&self.flow);
+        let measured = measure_until(flow, self.law, self.start, &self.budget, self.halt);
         measured.map_or(Record::default(), |measured| measured_record(&measured, needs))
     }
 

@@ -20,7 +20,7 @@ use crate::record::classify::CHAOS_ERRORS;
 use crate::record::distance::{self, farther};
 use crate::record::{Record, Records, valid};
 use machine::Flight;
-use rattlemap_dynamics::model::{MOST_FRICTION, Oscillator, State};
+use rattlemap_dynamics::model::{MOST_FRICTION, Oscillator, RigidModes, State, Timing};
 use rattlemap_dynamics::orbit::{Budget, Status};
 use rattlemap_dynamics::stability::{multipliers, standard_error};
 use rattlemap_dynamics::word::Word;
@@ -50,6 +50,10 @@ struct Strobed<'a> {
     flight: Flight,
     /// Forcing period.
     period: f64,
+    /// Directions along which a position does not matter. The motion is shifted back along them at each strobe.
+    rigid_modes: RigidModes,
+    /// Number of multipliers that are 1 for every cycle: of conserved momenta, and of a shift in time without force.
+    ones: usize,
     /// Phase at which states are compared, in radians.
     from: f64,
     /// Once set, the integration stops.
@@ -73,7 +77,9 @@ struct Tally {
 
 impl Strobed<'_> {
     fn new<'a>(oscillator: &Oscillator, start: State, halt: &'a AtomicBool) -> Strobed<'a> {
-        Strobed { flight: Flight::new(oscillator, &start), period: oscillator.period(), from: 0.0, halt }
+        let (flight, rigid_modes) = (Flight::new(oscillator, &start), oscillator.rigid_modes());
+        let ones = rigid_modes.conserved + usize::from(oscillator.timing == Timing::Cycle);
+        Strobed { flight, period: oscillator.period(), rigid_modes, ones, from: 0.0, halt }
     }
 
     /// Advances by one forcing period. None if the solver fails or is halted.
@@ -83,7 +89,12 @@ impl Strobed<'_> {
         }
         self.flight.events.clear();
         self.flight.slips.clear();
-        self.flight.advance(self.from, self.from + TAU)
+        self.flight.advance(self.from, self.from + TAU)?;
+        let state = self.flight.state();
+        for mode in &self.rigid_modes.modes {
+            self.flight.shift(&mode.direction, -state[2 * mode.coordinate]);
+        }
+        Some(())
     }
 
     /// Returns the elements with dry friction that never slid. Along their rows, neighbouring motions keep their distance.
@@ -98,7 +109,7 @@ impl Strobed<'_> {
         if self.from > 0.0 {
             flight.advance(self.from, TAU * (1.0 + ON_STROBE))?;
         }
-        Some(flight.state())
+        Some(self.rigid_modes.shifted_back(flight.state()))
     }
 
     /// Moves the phase at which states are compared to the middle of the longest flight. Returns false, and moves nothing, if the phase was
@@ -132,7 +143,10 @@ pub(super) fn record_until(
     budget: &Budget,
     halt: &AtomicBool,
 ) -> Option<Record> {
-    let (oscillator, start) = (plan.model(id).oscillator().ok()?, plan.start(id, records));
+    let (oscillator, start) = (
+        plan.model(id).oscillator().ok()?.on_cycle(records.record(id as usize).cycle_time()),
+        plan.start(id, records),
+    );
     follow(Strobed::new(&oscillator, start, halt), budget)
 }
 
@@ -215,7 +229,14 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
         monodromy = derivative(&motion, units, for_good)? * monodromy;
         motion.advance()?;
     }
-    let [re, im] = *multipliers(&monodromy)?.first()?;
+    let mut multipliers = multipliers(&monodromy)?;
+    for _ in 0..on.ones {
+        let off = |[re, im]: &[f64; 2]| (re - 1.0).hypot(*im);
+        let nearest =
+            (0..multipliers.len()).min_by(|&a, &b| off(&multipliers[a]).total_cmp(&off(&multipliers[b])))?;
+        multipliers.remove(nearest);
+    }
+    let [re, im] = multipliers.first().copied().unwrap_or_default();
     let (radius, tally) = (re.hypot(im), &motion.flight.tally);
     let mut record = Record {
         period,

@@ -56,7 +56,7 @@ fn the_page_lists_the_columns_of_all_files() {
     assert_eq!(header(&dir.join("out/starts/attractors.csv")), listed("attractors.csv"));
     let measured = listed("Measured quantities");
     let quantities = "impact_speed impact_speed_max impact_energy impact_rate contact_force_max contact_force_rms amplitude rms \
-                      harmonic dissipated multiplier stick_fraction friction_energy release_energy state";
+                      harmonic dissipated multiplier stick_fraction friction_energy release_energy cycle_time state";
     let list: String = quantities.split_whitespace().map(|name| format!("'{name}', ")).collect();
     let requested = format!("[outputs]\nquantities = [{list}]\n");
     fs::write(dir.join("measured.toml"), format!("{e}{omega}{requested}")).unwrap();

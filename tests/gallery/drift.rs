@@ -1,7 +1,12 @@
 //! Motion that is periodic but for a drift along a rigid-body mode: nothing holds the model to the ground in that direction.
 
+use crate::validate::fixtures::{cpu_records, validate_all};
+use rattlemap::gpu::Precision;
+use rattlemap::map::plan::Plan;
+use rattlemap::map::scene::Scene;
 use rattlemap::model_file::{FileModel, subjects};
 use rattlemap::record::measures;
+use rattlemap::validate::independent;
 use rattlemap_dynamics::model::{Model, REST, State, state};
 use rattlemap_dynamics::motion::{Flow, Trajectory};
 use rattlemap_dynamics::orbit::{
@@ -179,4 +184,25 @@ fn a_conserved_momentum_decides_the_mean_speed_and_a_load_accelerates() {
     bodies.set("load", 0.1).unwrap();
     let found = orbit(&bodies, REST);
     assert_eq!((found.class, found.status), (Class::Undecided, Status::Accelerates));
+}
+
+/// The judge shifts states back like the engines, and leaves out the same multipliers.
+#[test]
+fn maps_that_drift_are_judged() {
+    let mut judged = 0;
+    for (text, axes) in [
+        (CAPSULE, [("omega", 0.9..=1.3), ("a", 0.7..=1.1)]),
+        (DRIVELINE, [("omega", 1.5..=2.5), ("T", 0.3..=0.6)]),
+        (FREE, [("omega", 1.4..=2.0), ("k", 1.5..=2.5)]),
+    ] {
+        let [(x, xs), (y, ys)] = axes;
+        let scene = Scene::builder(model(text)).axis(x, xs, 3).axis(y, ys, 2).build().unwrap();
+        let plan = Plan::new(&scene);
+        let records = cpu_records(&plan);
+        let found = validate_all(&plan, &records, Precision::F64, false);
+        assert_eq!(found.faults(), Vec::<String>::new(), "{:?}", found.mismatches);
+        let of = |id: usize| independent::record(&plan, id as u32, &records).filter(|judge| judge.period > 0);
+        judged += (0..records.len()).filter_map(of).count();
+    }
+    assert!(judged >= 9, "{judged} of 18 cells have a period for the judge");
 }

@@ -9,7 +9,7 @@ use rattlemap_dynamics::model::Form;
 use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, Law, Model, Oscillator, REST, Restitution, Side, Spring,
-    State, Wall, state,
+    State, Timing, Wall, state,
 };
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{EventKind, GapEvent, Observer, SlipEvent, States};
@@ -490,6 +490,7 @@ fn row_of_three(phase: f64) -> Oscillator {
         gaps: vec![gap([1.0, -1.0, 0.0], 0.3), gap([0.0, 1.0, -1.0], 0.5)],
         friction: Vec::new(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }
 
@@ -593,6 +594,7 @@ fn dropped(restitution: Restitution) -> Oscillator {
         gaps: vec![GapRow { row: DVector::from_element(1, 1.0), walls: [Vec::new(), vec![wall]] }],
         friction: Vec::new(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }
 

@@ -21,3 +21,4 @@ mod pieces;
 mod random;
 mod signals;
 mod single_impact;
+mod unforced;

@@ -79,6 +79,7 @@ fn computed(command: &str, text: &str) -> Result<Value, String> {
     let Some(motion) = analysed.map_err(|error| message(&error))? else {
         return Err("the analysis was stopped".to_owned());
     };
+    let cell = cell.on_cycle(motion.cycle_time);
     let mut figures = Map::new();
     if motion.class != Class::Failed {
         let samples = samples_per_period(&cell.oscillator().map_err(|error| message(&error))?);

@@ -67,6 +67,11 @@ impl<'s> MachineMotion<'s> {
         self.system.to_state(&self.point)
     }
 
+    /// Returns the time derivative of the state.
+    pub(crate) fn velocity(&self) -> Numbers {
+        self.system.to_state(&self.system.domain(&self.modes).derivative(&self.point))
+    }
+
     /// Returns the machine.
     pub fn system(&self) -> &'s System {
         self.system

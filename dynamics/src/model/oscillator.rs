@@ -9,6 +9,7 @@
 //! A gap is a row of displacements `z = row . x` with walls on one side or on both. The force of a contact acts along this row.
 
 use std::cmp::Ordering;
+use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -189,6 +190,28 @@ pub struct Signal {
     pub waves: [f64; 2],
 }
 
+/// What the period `2 pi / omega` is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Timing {
+    /// The period of the force, or of the stages.
+    Forced,
+    /// A unit of time in which budgets count: no parameter can give the model a force, harmonics or stages.
+    Free,
+    /// The time of a cycle without force. Phase 0 may lie anywhere on the cycle.
+    Cycle,
+}
+
+impl Timing {
+    /// Returns the names of one period and of several.
+    pub fn names(self) -> [&'static str; 2] {
+        match self {
+            Timing::Forced => ["forcing period", "forcing periods"],
+            Timing::Free => ["clock period", "clock periods"],
+            Timing::Cycle => ["cycle", "cycles"],
+        }
+    }
+}
+
 /// A forced piecewise-linear oscillator. All vectors have one entry per coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
@@ -209,6 +232,8 @@ pub struct Oscillator {
     pub friction: Vec<DryFriction>,
     /// Signals, up to [`MOST_SIGNALS`].
     pub signals: Vec<Signal>,
+    /// What `omega` means.
+    pub timing: Timing,
 }
 
 /// Checks that all entries of a vector or matrix are finite.
@@ -234,6 +259,7 @@ impl Oscillator {
             (self.gaps.len() > 1, "several gaps"),
             (!self.friction.is_empty(), "dry friction"),
             (!self.signals.is_empty(), "signals"),
+            (self.timing != Timing::Forced, "no force, harmonics or stages"),
             (
                 walls.any(|wall| matches!(wall.restitution, Restitution::BySpeed { .. })),
                 "restitution that depends on the approach speed",
@@ -263,7 +289,23 @@ impl Oscillator {
 
     /// Returns the forcing period `2 pi / omega`.
     pub fn period(&self) -> f64 {
-        std::f64::consts::TAU / self.omega
+        TAU / self.omega
+    }
+
+    /// Returns the oscillator without force whose period is the time of a cycle, or the same oscillator without a time.
+    pub fn on_cycle(self, time: Option<f64>) -> Oscillator {
+        match time {
+            Some(time) => Oscillator { omega: TAU / time, timing: Timing::Cycle, ..self },
+            None => self,
+        }
+    }
+
+    /// Returns the lowest frequency of undamped free motion in the first stage, without rigid-body modes; none if no stiffness acts.
+    pub fn slowest_natural_frequency(&self) -> Option<f64> {
+        let root = self.mass.clone().cholesky()?.l().try_inverse()?;
+        let squares = (&root * &self.stages[0].stiffness * root.transpose()).symmetric_eigenvalues();
+        let least = MATRIX_TOLERANCE * squares.amax();
+        squares.iter().filter(|&&square| square > least).map(|square| square.sqrt()).reduce(f64::min)
     }
 
     /// Returns the highest order of a harmonic; 1 without a force.

@@ -604,6 +604,17 @@ pub enum Form {
     Machine(Oscillator),
 }
 
+impl Form {
+    /// Returns the form whose period is the [time of a cycle](Oscillator::on_cycle).
+    #[must_use]
+    pub fn on_cycle(self, time: Option<f64>) -> Form {
+        match self {
+            Form::Machine(machine) => Form::Machine(machine.on_cycle(time)),
+            pair @ Form::Pair(_) => pair,
+        }
+    }
+}
+
 impl From<&Oscillator> for Form {
     fn from(oscillator: &Oscillator) -> Form {
         Pair::of(oscillator).map_or_else(|| Form::Machine(oscillator.clone()), Form::Pair)

@@ -89,7 +89,7 @@ impl RigidModes {
     }
 
     /// Shifts a state back along the modes, so that the coordinate that measures each mode is 0.
-    pub(crate) fn shifted_back(&self, mut y: State) -> State {
+    pub fn shifted_back(&self, mut y: State) -> State {
         for mode in &self.modes {
             let by = y[2 * mode.coordinate];
             mode.direction.iter().enumerate().for_each(|(i, direction)| y[2 * i] -= by * direction);
@@ -115,7 +115,7 @@ impl Oscillator {
 
 impl Pair {
     /// Returns the rigid-body modes: none, or one that [`Pair::other`] measures.
-    pub(crate) fn rigid_modes(&self) -> RigidModes {
+    pub fn rigid_modes(&self) -> RigidModes {
         if self.degrees == 1 {
             return RigidModes::default();
         }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::parameter::{model, model_methods};
 use super::{
     Contact, Drive, Forces, GapRow, Law, Model, ModelError, Oscillator, Parameter, Range, Restitution,
-    Shapes, Spring, Wall,
+    Shapes, Spring, Timing, Wall,
 };
 
 model! {
@@ -52,6 +52,7 @@ impl Stops {
             gaps: vec![GapRow { row: row(1.0), walls: [vec![wall(self.b)], vec![wall(-self.b)]] }],
             friction: Vec::new(),
             signals: Vec::new(),
+            timing: Timing::Forced,
         };
         oscillator.validate()?;
         Ok(oscillator)

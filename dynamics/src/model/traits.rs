@@ -75,6 +75,10 @@ pub trait Model: CloneModel + Debug + Send + Sync + Any {
         phase == 0.0
     }
 
+    /// Sets the time of a cycle without force, which is then the [period](Oscillator::on_cycle) of the oscillator. Models with a force
+    /// ignore it.
+    fn set_cycle_time(&mut self, _time: f64) {}
+
     /// Returns the names of the state's components: displacement and velocity of each degree of freedom. A model of
     /// one degree of freedom uses the first half of a [`State`](super::State); the other half is 0.
     fn state_names(&self) -> Vec<&str>;
@@ -160,6 +164,13 @@ impl<M: Model + Clone + PartialEq> CloneModel for M {
 }
 
 impl dyn Model {
+    /// Returns the model with the period of one of its cycles without force, or the same model without a time.
+    pub fn on_cycle(&self, time: Option<f64>) -> Box<dyn Model> {
+        let mut model = self.clone_model();
+        time.into_iter().for_each(|time| model.set_cycle_time(time));
+        model
+    }
+
     /// Returns the model as an `M`, if it is one.
     pub fn downcast_ref<M: Model>(&self) -> Option<&M> {
         let any: &dyn Any = self;

@@ -4,7 +4,7 @@ use super::Drift;
 use crate::machine::System;
 use crate::model::{
     Contact, Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, RigidMode, RigidModes, Signal,
-    State, first_four, state,
+    State, Timing, first_four, state,
 };
 use crate::pair::PairFlow;
 use crate::pair::flow::power_of_two;
@@ -37,6 +37,8 @@ pub struct Flow {
     pub(crate) degrees: usize,
     symmetric: bool,
     non_impacting: Option<NonImpacting>,
+    /// What `period` is.
+    pub timing: Timing,
     /// Rigid-body modes. The motion is shifted back along them at each phase 0.
     pub rigid_modes: RigidModes,
     engine: Engine,
@@ -70,6 +72,7 @@ impl Flow {
             degrees: pair.degrees,
             symmetric: pair.mirror_symmetric(),
             non_impacting: NonImpacting::new(pair).or_else(|| NonImpacting::with_one_at_rest(pair)),
+            timing: Timing::Forced,
             rigid_modes: pair.rigid_modes(),
             engine: Engine::Pair(flow),
         }
@@ -87,6 +90,7 @@ impl Flow {
             degrees: machine.degrees(),
             symmetric: machine.mirror_symmetric(),
             non_impacting: NonImpacting::of_machine(machine),
+            timing: machine.timing,
             rigid_modes: system.rigid_modes().clone(),
             engine: Engine::Machine(system),
         }
@@ -120,6 +124,13 @@ impl Flow {
             Engine::Pair(flow) => Flow::of_pair(&flow.oscillator.at_phase(phase)),
             Engine::Machine(system) => Flow::of_machine(&system.machine().at_phase(phase)),
         }
+    }
+
+    /// Returns the flow of a machine without force whose period is the time of a cycle.
+    pub(crate) fn on_cycle(&self, time: f64) -> Option<Flow> {
+        let Engine::Machine(system) = &self.engine else { return None };
+        // The quotient `2 pi / omega` may differ from the time by rounding.
+        Some(Flow { period: time, ..Flow::of_machine(&system.machine().clone().on_cycle(Some(time))) })
     }
 
     /// Returns the memory that the flow occupies, in bytes, without the domains of a machine, which are built on first use.

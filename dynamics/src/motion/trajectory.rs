@@ -105,6 +105,25 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         Trajectory { flow: self.flow, motion }
     }
 
+    /// Starts a trajectory at phase 0 of another flow of the same machine, in the present state and modes. Returns nothing for a pair.
+    pub(crate) fn in_flow<'g>(&self, flow: &'g Flow) -> Option<Trajectory<'g>>
+    where
+        'f: 'g,
+    {
+        let (Engines::Machine(motion), Engine::Machine(system)) = (&self.motion, flow.engine()) else {
+            return None;
+        };
+        Some(Trajectory { flow, motion: Engines::Machine(Box::new(motion.in_system(system))) })
+    }
+
+    /// Returns the time derivative of the state of a machine, and 0 for a pair.
+    pub(crate) fn velocity(&self) -> State {
+        match &self.motion {
+            Engines::Pair(_) => REST,
+            Engines::Machine(motion) => motion.velocity(),
+        }
+    }
+
     /// Starts a trajectory at phase 0 from the mirror image of the present state, in the mirrored domain. Returns nothing for a machine: the
     /// mirror image of its modes is not known.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [State; M]) -> Option<Trajectory<'f, M>> {

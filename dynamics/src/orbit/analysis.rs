@@ -10,7 +10,7 @@ use super::recurrence::{Candidate, Metric, RECURRENCE_DISTANCE, candidates, rest
 use super::regularity::is_regular;
 use super::resolution::{is_below_resolution, too_few_events};
 use super::{Class, Orbit, Section, Settings, Status};
-use crate::model::{Law, Model, ModelError, NonImpacting, State};
+use crate::model::{Law, Model, ModelError, NonImpacting, State, Timing};
 use crate::motion::Flow;
 use crate::motion::{Allowance, Stop, Trajectory, share};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton, StrobeMap, norm};
@@ -172,6 +172,7 @@ fn failed(status: Status, strobe: State, forcing_period: f64) -> Orbit {
         slips: Vec::new(),
         cycle_periods: 0,
         forcing_period,
+        cycle_time: None,
         periods_run: 0,
     }
 }
@@ -289,6 +290,12 @@ impl Analysis<'_> {
             if self.flow.rigid_modes.accelerates {
                 return self.aperiodic(trajectory, &window, Class::Undecided, Status::Accelerates);
             }
+            let free =
+                if self.flow.timing == Timing::Free { self.free_orbit(&trajectory, length) } else { None };
+            let approaches = free.as_ref().is_some_and(|free| free.approaches);
+            if let Some(free) = free.filter(|free| free.is_reached(length >= last)) {
+                return Ok(free.orbit);
+            }
             let found = candidates(&window.strobes, &window.metric, self.settings.max_period);
             for candidate in &found {
                 if let Some(orbit) = self.confirm(&trajectory, &window, candidate)? {
@@ -298,7 +305,7 @@ impl Analysis<'_> {
             if self.is_chaotic(&window) {
                 return self.aperiodic(trajectory, &window, Class::Chaotic, Status::Ok);
             }
-            if self.is_quasi_periodic(&window) {
+            if !approaches && self.is_quasi_periodic(&window) {
                 return self.aperiodic(trajectory, &window, Class::QuasiPeriodic, Status::Ok);
             }
             if length >= last || trajectory.work().steps > EXTENSION_STEPS {
@@ -655,6 +662,8 @@ impl Analysis<'_> {
         } else {
             Status::Ok
         };
+        let moves = self.flow.timing == Timing::Forced || self.moves(seed, cycle);
+        let rests = !moves && reading.events.is_empty();
         Ok(Orbit {
             class: Class::Periodic { period: cycle.period },
             status,
@@ -665,15 +674,25 @@ impl Analysis<'_> {
             word: reading.word.clone(),
             impacts_per_period: reading.impacts_per_period,
             mesh_fraction: reading.mesh_fraction,
-            quantities: reading.quantities,
+            quantities: if rests { reading.quantities.map(Quantities::at_rest) } else { reading.quantities },
             strobe: cycle.state,
             strobe_meshing: reading.strobe_meshing,
             events: reading.events.clone(),
             slips: reading.slips.clone(),
             cycle_periods: cycle.period,
             forcing_period: self.flow.period,
+            cycle_time: (moves && self.flow.timing == Timing::Cycle).then_some(self.flow.period),
             periods_run: 0,
         })
+    }
+
+    /// Whether the motion of a cycle moves, other than along rigid-body modes.
+    fn moves(&self, seed: &Trajectory<'_>, cycle: &Cycle) -> bool {
+        let flow = self.flow;
+        let velocity = flow.rigid_modes.shifted_back(seed.at(cycle.state, []).velocity());
+        let rates = velocity.as_chunks::<2>().0.iter();
+        let sizes = rates.map(|[rate, acceleration]| rate.abs().max(acceleration.abs() / flow.omega));
+        sizes.fold(0.0, f64::max) > ON_CYCLE * flow.omega * flow.length
     }
 
     /// Measures the observed periods that follow a trajectory; none if they are not requested or it cannot be
@@ -715,6 +734,7 @@ impl Analysis<'_> {
             slips: reading.slips,
             cycle_periods: self.event_periods,
             forcing_period: self.flow.period,
+            cycle_time: None,
             periods_run: 0,
         })
     }

@@ -18,8 +18,8 @@ use super::recurrence::{Metric, RECURRENCE_DISTANCE, candidates, near_saddle, re
 use super::regularity::is_regular;
 use super::resolution::too_few_events;
 use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch};
-use super::{Budget, Orbit, Section, Status};
-use crate::model::{Law, State};
+use super::{Budget, Class, Orbit, Section, Status};
+use crate::model::{Law, State, Timing};
 use crate::motion::Flow;
 use crate::motion::{Allowance, Stop, Trajectory, share};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
@@ -65,6 +65,8 @@ pub struct Measurement {
     pub symmetric: Option<bool>,
     /// Word of the cycle.
     pub word: Option<Word>,
+    /// Time of a cycle without force; none if the motion is at rest.
+    pub cycle_time: Option<f64>,
     /// Modulus and argument of the largest multiplier of the cycle.
     pub multiplier: Option<[f64; 2]>,
     /// Quantities over the cycle, or over the observed periods that follow aperiodic motion, if requested.
@@ -174,6 +176,7 @@ fn measure_by_strobes(
         exponent: Exponent::default(),
         cycle: None,
         approaches: false,
+        approaches_free: false,
         is_neutral: false,
         is_on_unstable: false,
         counts: vec![[0.0; 3]],
@@ -223,6 +226,8 @@ struct CellRun<'a> {
     cycle: Option<FoundCycle<'a>>,
     /// Whether the last check found `cycle`, or the motion was closer to it than when it was found.
     approaches: bool,
+    /// Whether the last check found a cycle without force that the motion approaches.
+    approaches_free: bool,
     /// Whether the last check found a neutral cycle nearby.
     is_neutral: bool,
     /// Whether the motion lies on an unstable cycle when its budget ends.
@@ -296,7 +301,8 @@ impl<'a> CellRun<'a> {
         *next_check = next.min(stages.min().unwrap_or(last));
         let is_last = [budget, decided_by, last].contains(&now);
         if let Some(orbit) = self.confirmed_orbit(&trajectory.carrying([]), is_last)? {
-            let strobe = if is_last { trajectory.state() } else { orbit.strobe };
+            let is_own = is_last && orbit.cycle_time.is_none();
+            let strobe = if is_own { trajectory.state() } else { orbit.strobe };
             return Ok(Some(Box::new(self.periodic(orbit, strobe))));
         }
         let mut work = trajectory.work();
@@ -355,6 +361,18 @@ impl<'a> CellRun<'a> {
 
     /// Returns the orbit of a cycle that the strobe states approach.
     fn confirmed_orbit(&mut self, seed: &Trajectory<'a>, is_last: bool) -> Result<Option<Orbit>, Stop> {
+        if self.analysis.flow.timing == Timing::Free {
+            let now = self.strobes.len() as u32 - 1;
+            let periods = if is_last { self.budget.settings.observed_periods } else { now / CHECK_DIVISOR };
+            let free = self.analysis.free_orbit(seed, periods.max(FIRST_CHECK));
+            self.approaches_free = free.as_ref().is_some_and(|free| free.approaches);
+            if let Some(free) = free.filter(|free| free.is_reached(is_last)) {
+                if let Class::Periodic { .. } = free.orbit.class {
+                    return Ok(Some(free.orbit));
+                }
+                self.is_on_unstable = true;
+            }
+        }
         let max_period = self.budget.settings.max_period;
         let window = &self.strobes[self.strobes.len().saturating_sub(2 * max_period as usize + 1)..];
         let metric = Metric::of(window, self.analysis.flow);
@@ -529,6 +547,7 @@ impl<'a> CellRun<'a> {
             mesh_fraction: orbit.mesh_fraction,
             symmetric: orbit.symmetric,
             word: Some(orbit.word),
+            cycle_time: orbit.cycle_time,
             multiplier: orbit.floquet.and_then(|multipliers| multipliers.first().copied()).map(polar),
             quantities: orbit.quantities,
             strobe,
@@ -566,6 +585,7 @@ impl<'a> CellRun<'a> {
         let late = &self.strobes[self.strobes.len() / TRANSIENT_SHARE..];
         let accelerates = self.analysis.flow.rigid_modes.accelerates;
         let is_quasi_periodic = !accelerates
+            && !self.approaches_free
             && self.strobes.len() > self.budget.periods() as usize
             && lyapunov.is_some_and(|(mean, error)| {
                 mean >= -errors * error - GROWTH_ROUNDING / period && is_neutral(mean.abs())
@@ -598,6 +618,7 @@ impl<'a> CellRun<'a> {
             mesh_fraction: 0.0,
             symmetric: None,
             word: None,
+            cycle_time: None,
             multiplier: None,
             quantities: None,
             strobe: self.strobes[self.strobes.len() - 1],

@@ -31,6 +31,21 @@ pub struct Quantities {
     pub gaps: Option<[GapQuantities; MOST_GAPS]>,
 }
 
+impl Quantities {
+    /// Returns the quantities without what is left of the motion that has come to rest.
+    pub(super) fn at_rest(mut self) -> Quantities {
+        for displacement in &mut self.displacements {
+            (displacement.amplitude, displacement.harmonic) = (0.0, [0.0; 2]);
+            displacement.rms = if displacement.drift.is_some() { 0.0 } else { displacement.mean.abs() };
+        }
+        if self.displacements.iter().all(|displacement| displacement.drift.is_none()) {
+            self.dissipated = 0.0;
+            self.friction.iter_mut().for_each(|friction| friction.dissipated = 0.0);
+        }
+        self
+    }
+}
+
 /// Contacts of one gap.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GapQuantities {

@@ -7,7 +7,7 @@ use nalgebra::{
 
 use super::unit_circle::lies_within_unit_circle;
 use super::{Cycle, Image, StrobeMap, multipliers};
-use crate::model::{State, difference, state, sum};
+use crate::model::{State, Timing, difference, state, sum};
 use crate::motion::{Trajectory, Work};
 
 /// Limits of one Newton search.
@@ -216,6 +216,29 @@ fn newton_step(image: &Image, residual: &State) -> Option<State> {
     Some(in_displacements(&step, image.rate.recip()))
 }
 
+/// Solves `(P' - I) step + velocity time = -residual` for the smallest step and time. Returns none if an entry is not finite.
+pub(crate) fn step_and_time(
+    image: &Image,
+    residual: &State,
+    velocity: &State,
+    omega: f64,
+) -> Option<(State, f64)> {
+    let (size, residual) = (image.scaled.nrows(), in_displacements(residual, image.rate));
+    let (entry, velocity) = (image.balanced_entries(), in_displacements(velocity, image.rate));
+    let matrix = DMatrix::from_fn(size, size + 1, |i, j| match j {
+        _ if j == size => velocity[i] / omega,
+        _ => entry(i, j) - f64::from(u8::from(i == j)),
+    });
+    if !matrix.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let svd = matrix.try_svd(true, true, f64::EPSILON, SVD_CAP)?;
+    let cutoff = SINGULAR_CUTOFF * svd.singular_values.max();
+    let solved = svd.solve(&-DVector::from_column_slice(&residual[..size]), cutoff).ok()?;
+    let step = in_displacements(&state(&solved.as_slice()[..size]), image.rate.recip());
+    Some((step, solved[size] / omega))
+}
+
 /// Solves `matrix step = -residual` by least squares.
 fn balanced_step<D>(matrix: OMatrix<f64, D, D>, residual: &OVector<f64, D>) -> Option<OVector<f64, D>>
 where
@@ -242,10 +265,12 @@ fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> 
     let matrix = DMatrix::from_fn(size, size, entry);
     let mut scaled_multipliers = multipliers(&matrix)?;
     // A shift along a rigid-body mode is undone: it has the multiplier 0. If momentum along the mode is conserved, its rate has the
-    // multiplier 1. An element that never slides makes a family of cycles along its row, with the multiplier 1, too.
+    // multiplier 1. An element that never slides makes a family of cycles along its row, with the multiplier 1, too, and so does the choice
+    // of phase 0 on a cycle without force.
     let (rigid, conserved) = (seed.flow().rigid_modes.modes.len(), seed.flow().rigid_modes.conserved);
     scaled_multipliers.truncate(2 * seed.flow().degrees - rigid);
-    for _ in 0..conserved + image.never_slid {
+    let free_phase = usize::from(seed.flow().timing == Timing::Cycle);
+    for _ in 0..conserved + image.never_slid + free_phase {
         let off = |[re, im]: &[f64; 2]| (re * log_scale.exp() - 1.0).hypot(im * log_scale.exp());
         let nearest = scaled_multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
         let Some((along, _)) = nearest.filter(|(_, of)| rigid == 0 || off(of) < UNIT_ERROR) else { break };

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
     Drive, DryFriction, Forces, Form, GapRow, Law, Model, Oscillator, Pair, Restitution, Side, Spring, State,
-    Wall, state,
+    Timing, Wall, state,
 };
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::pair::{DomainKind, Gap, LinearFlow, PairFlow};
@@ -184,5 +184,6 @@ pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
         gaps: vec![GapRow { row: vector(pair.gap), walls: Side::BOTH.map(walls) }],
         friction: Vec::new(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }

@@ -169,6 +169,8 @@ named! {
         FrictionEnergy = "friction_energy",
         /// Energy that walls with `pull = false` still hold when contact ends, per unit time.
         ReleaseEnergy = "release_energy",
+        /// Time of a cycle without force.
+        CycleTime = "cycle_time",
         /// Last state at phase 0.
         State = "state",
     }

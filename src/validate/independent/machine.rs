@@ -15,7 +15,7 @@ use nalgebra::DVector;
 
 use super::Tally;
 use super::dop853::Integration;
-use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, Side, State};
+use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, REST, Side, State};
 use rattlemap_dynamics::motion::EventKind;
 
 use system::{Constraints, Domain, Functional, Key, Numbers, PhasePoint, Slide, System, affine, dot, size};
@@ -208,6 +208,14 @@ impl Flight {
     pub(super) fn coordinates(&self) -> Vec<f64> {
         let n = self.system.n;
         (0..2 * n).map(|i| self.y[i / 2 + n * (i % 2)]).collect()
+    }
+
+    /// Shifts all displacements along a direction that changes no gap.
+    pub(super) fn shift(&mut self, direction: &DVector<f64>, by: f64) {
+        let mut state = REST;
+        direction.iter().enumerate().for_each(|(i, direction)| state[2 * i] = by * direction);
+        let shift = self.system.to_coordinates(&state);
+        (self.system.gaps()..self.system.n).for_each(|i| self.y[i] += shift[i]);
     }
 
     /// Returns the phases in turns at which the stage changes.

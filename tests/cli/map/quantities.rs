@@ -3,7 +3,7 @@
 use super::*;
 
 const ALL: &str = "impact_speed impact_speed_max impact_energy impact_rate contact_force_max contact_force_rms amplitude rms harmonic \
-                   dissipated multiplier stick_fraction friction_energy release_energy state";
+                   dissipated multiplier stick_fraction friction_energy release_energy cycle_time state";
 
 /// A folder with a scene `s.toml` of a model, over two of its parameters, that requests all measured quantities.
 fn measured(model: &str, axes: [(&str, f64, f64); 2], counts: [usize; 2], more: &str) -> TempDir {
@@ -33,7 +33,7 @@ fn a_model_with_one_coordinate_has_columns_and_figures_of_that_coordinate() {
     let (header, _) = rows(&out.join("cells.csv"));
     let names = "impact_speed,impact_speed_max,impact_energy,impact_rate,contact_force_max,contact_force_rms,amplitude_x,mean_x,\
                  amplitude_gap,mean_gap,rms_x,rms_gap,harmonic_x,harmonic_phase_x,harmonic_gap,harmonic_phase_gap,dissipated,\
-                 multiplier,multiplier_argument,stick_fraction,friction_energy,release_energy,state_x,state_v,status";
+                 multiplier,multiplier_argument,stick_fraction,friction_energy,release_energy,cycle_time,state_x,state_v,status";
     assert!(header.contains(&format!(",{names},")), "{header}");
     let files = crate::common::names(&out);
     for name in names.split(',').filter(|name| *name != "status") {

@@ -58,30 +58,44 @@ impl<'s> MachineMotion<'s> {
     /// Starts from another state at phase 0, in the modes of this motion and with its remaining allowance. The state alone does not determine
     /// the modes: a gap just in front of a wall may be free or in a contact onset.
     pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> MachineMotion<'s> {
+        let mut started = MachineMotion::new(self.system, state);
+        started.take_modes_of(self);
+        started.set_tangents(tangents);
+        started
+    }
+
+    /// Starts at phase 0 of a system that differs in its clock only, in the present state and modes.
+    pub(crate) fn in_system<'g>(&self, system: &'g System) -> MachineMotion<'g>
+    where
+        's: 'g,
+    {
+        let mut started = MachineMotion::new(system, &self.state());
+        started.take_modes_of(self);
+        started
+    }
+
+    fn take_modes_of(&mut self, motion: &MachineMotion<'s>) {
         let system = self.system;
-        let mut started = MachineMotion::new(system, state);
-        started.allowance = self.allowance();
-        started.origin = self.origin;
+        self.allowance = motion.allowance();
+        self.origin = motion.origin;
         for gap in 0..system.gaps() {
-            let mode = self.modes.gaps[gap];
+            let mode = motion.modes.gaps[gap];
             let lasts = match mode {
                 GapMode::Stuck(side) => {
-                    started.point[gap] = system.last_wall(gap, side).at;
+                    self.point[gap] = system.last_wall(gap, side).at;
                     true
                 }
-                GapMode::Onset(side) => started.modes.gaps[gap] == system.before_last(gap, side),
+                GapMode::Onset(side) => self.modes.gaps[gap] == system.before_last(gap, side),
                 _ => false,
             };
             if lasts {
-                (started.modes.gaps[gap], started.roots.at_wall[gap]) = (mode, None);
+                (self.modes.gaps[gap], self.roots.at_wall[gap]) = (mode, None);
             }
         }
-        started.modes.slips = self.modes.slips;
-        started.has_slid = self.modes.slips.map(|slip| slip != Slip::Stick);
-        started.roots.from_rate = [0; MOST_FRICTION];
-        system.hold(&started.modes, &mut started.point, false);
-        started.set_tangents(tangents);
-        started
+        self.modes.slips = motion.modes.slips;
+        self.has_slid = motion.modes.slips.map(|slip| slip != Slip::Stick);
+        self.roots.from_rate = [0; MOST_FRICTION];
+        system.hold(&self.modes, &mut self.point, false);
     }
 
     /// Determines the modes of the start.

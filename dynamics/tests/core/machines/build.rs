@@ -1,7 +1,7 @@
 //! Machines from oscillators, and machines from machines.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Drive, DryFriction, Forces, GapRow, Oscillator};
+use rattlemap_dynamics::model::{Drive, DryFriction, Forces, GapRow, Oscillator, Timing};
 
 /// Returns the machine of machines side by side that do not touch each other. It has the frequency and the schedule of the first one, and
 /// all others have one stage.
@@ -66,6 +66,7 @@ pub(crate) fn side_by_side(machines: &[Oscillator]) -> Oscillator {
         gaps,
         friction,
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }
 
@@ -99,5 +100,6 @@ pub(crate) fn in_coordinates(machine: &Oscillator, t: &DMatrix<f64>) -> Oscillat
             .map(|one| DryFriction { row: vector(&one.row), ..one.clone() })
             .collect(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }

@@ -1,7 +1,9 @@
 //! Impacts while other gaps rest on rigid walls, by hand.
 
 use nalgebra::{DMatrix, DVector};
-use rattlemap_dynamics::model::{Contact, Forces, GapRow, Oscillator, Restitution, Side, Spring, Wall};
+use rattlemap_dynamics::model::{
+    Contact, Forces, GapRow, Oscillator, Restitution, Side, Spring, Timing, Wall,
+};
 
 use super::motion::{Mode, Motion, What};
 use super::system::{ANGLE, System};
@@ -35,6 +37,7 @@ fn row_of_masses(loads: &[f64]) -> Oscillator {
         gaps: (0..n).map(gap).collect(),
         friction: Vec::new(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Side, Spring, Wall,
+    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Side, Spring, Timing, Wall,
 };
 
 use super::super::independent::random::Random;
@@ -197,6 +197,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         gaps: Vec::new(),
         friction: Vec::new(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     };
     let mut rows: Vec<Vector> = Vec::new();
     while rows.len() < shape.gaps {

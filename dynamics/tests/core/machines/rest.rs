@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::machine::{MachineMotion, System};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Spring, Wall, state as state_of,
+    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Spring, Timing, Wall,
+    state as state_of,
 };
 
 fn wall(at: f64, contact: Contact, e: f64) -> Wall {
@@ -31,6 +32,7 @@ fn machine(
         gaps: vec![GapRow { row: DVector::from_row_slice(gap), walls }],
         friction: Vec::new(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }
 

@@ -12,7 +12,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use rattlemap_dynamics::model::{
     Contact, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, MOST_HARMONICS,
-    Oscillator, REST, Restitution, Side, Spring, State, Wall,
+    Oscillator, REST, Restitution, Side, Spring, State, Timing, Wall,
 };
 
 /// Largest number of entries of a point.
@@ -491,5 +491,6 @@ fn transformed(machine: &Oscillator, [length, speed]: [f64; 2], from: &DMatrix<f
             })
             .collect(),
         signals: Vec::new(),
+        timing: Timing::Forced,
     }
 }
