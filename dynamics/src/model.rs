@@ -21,6 +21,7 @@ pub use error::OscillatorError;
 pub use gear_pair::GearPair;
 pub use law::{Contact, Law};
 pub use non_impacting::NonImpacting;
+pub(crate) use oscillator::LEAST_LENGTH;
 pub use oscillator::{
     Drive, DryFriction, Forces, GapRow, HIGHEST_ORDER, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS,
     MOST_HARMONICS, MOST_SIGNALS, MOST_WALLS, Oscillator, Restitution, Signal, Spring, Timing, Wall,

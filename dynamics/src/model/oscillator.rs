@@ -41,7 +41,7 @@ pub(super) const ESCAPE_WITHOUT_SCALE: f64 = 1e100;
 pub(super) const MATRIX_TOLERANCE: f64 = 1e-12;
 
 /// Lower bound of [`Oscillator::length_scale`], which must not be zero.
-pub(super) const LEAST_LENGTH: f64 = 1e-150;
+pub(crate) const LEAST_LENGTH: f64 = 1e-150;
 
 /// Largest number of coordinates.
 pub const MOST_COORDINATES: usize = 8;

@@ -1,9 +1,9 @@
 //! The verdict on a step: clear, exactly one crossing, or undecided at this length.
 
 use super::{Mode, PairMotion};
-use crate::model::Side;
+use crate::model::{LEAST_LENGTH, Side};
 use crate::pair::certificate::{Bernstein, Bracket, ROOMY, Verdict, judge};
-use crate::pair::flow::{Gap, LinearFlow, Phasor, Step};
+use crate::pair::flow::{DomainKind, Gap, LinearFlow, Phasor, Step};
 
 /// Distance from a wall that is rounding error, relative to the wall's position or the scale of length.
 const WALL_ROUNDING: f64 = 32.0 * f64::EPSILON;
@@ -101,7 +101,13 @@ impl<const N: usize> PairMotion<'_, N> {
     /// wall it is.
     #[inline(always)]
     fn stays_on_wall(&self, gap: &Bernstein, order: usize, remainder: f64) -> bool {
-        let rounding = |wall: f64| WALL_ROUNDING * wall.abs().max(self.flow.length);
+        let mut length = self.flow.length;
+        if length == LEAST_LENGTH {
+            // There is no scale of length: rounding is relative to the other displacement.
+            let rate = self.flow.domain(DomainKind::Free).rate;
+            length = length.max(self.q[2].abs()).max(self.q[3].abs() / rate);
+        }
+        let rounding = |wall: f64| WALL_ROUNDING * wall.abs().max(length);
         let ends_on = |wall: f64| (gap.end() - wall).abs() < rounding(wall);
         let within = |wall: f64| {
             let rounding = rounding(wall);

@@ -1,6 +1,6 @@
 //! Classification of oscillators with one wall, against closed forms, and the effect of units.
 
-use crate::common::linear::{Linear, transformed, with_wall};
+use crate::common::linear::{Linear, transformed, unforced, with_wall};
 use crate::common::pairs::AsPair;
 use crate::common::{BUDGET, near};
 use crate::single_stop::{Family, Impacting};
@@ -268,6 +268,26 @@ fn a_unit_of_time_that_is_a_power_of_two_changes_no_class() {
                 let close = 1e-9 * (1.0 + ours.strobe[i].abs());
                 let same = ours.periods_run == theirs.periods_run;
                 assert!(!same || near(theirs.strobe[i] / unit, ours.strobe[i], close), "{}", say());
+            }
+        }
+    }
+}
+
+/// Two equal pendulums lose their relative motion in impacts, and then swing together for ever. Nothing in this model has a length.
+#[test]
+fn equal_pendulums_that_collide_end_in_a_common_swing() {
+    let free =
+        Domain { damping: [[0.0; 2]; 2], stiffness: [[1.0, 0.0], [0.0, 1.0]], load: [0.0; 2], preload: 0.0 };
+    let pendulums = Pair { gap: [1.0, -1.0], ..unforced(2, free) };
+    let flow = Flow::new(&with_wall(pendulums, Side::Right, 0.0, Contact::Rigid, [0.0; 2]));
+    for e in [0.0, 0.3, 0.5, 0.8] {
+        for [x1, v1, x2, v2] in [[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.3], [1.0, 0.0, 1.0, 0.0], [0.0; 4]] {
+            let start = state(&[x1, v1, x2, v2]);
+            let orbit = analyse_flow(&flow, Law::both(e, 0.0), start, &Settings::default(), 8);
+            assert_eq!(orbit.class, Class::Periodic { period: 1 }, "{e} {start:?}: {:?}", orbit.status);
+            let together = [0.5 * (x1 + x2), 0.5 * (v1 + v2)];
+            for (ours, exact) in orbit.strobe.into_iter().zip([together, together].concat()) {
+                assert!(near(ours, exact, 1e-12), "{e} {start:?}: {:?}", orbit.strobe);
             }
         }
     }
