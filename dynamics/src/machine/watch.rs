@@ -3,7 +3,7 @@
 use super::domain::{Functional, LinearDomain, Path};
 use super::frame::Frame;
 use super::modes::{GapMode, Modes};
-use super::polynomial::{Fall, Polynomial, bernstein, first_fall};
+use super::polynomial::{Fall, Polynomial, Weights, bernstein, first_fall};
 use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
@@ -213,7 +213,12 @@ impl<'a> Moment<'a> {
         let Some((gap, at, direction)) = self.distance(watch) else {
             let row = self.function(watch);
             let [_, size] = row.value_and_size(self.point);
-            return first_fall(&self.domain.along(&row, path), None, self.order(watch, &row), size);
+            let along = self.domain.along(&row, path);
+            let fall = first_fall(&along, None, self.order(watch, &row), size);
+            return match (watch, fall) {
+                (Watch::Slips(..), Fall::At(share)) => beyond_rounding(&along, share, size),
+                _ => fall,
+            };
         };
         let order = match self.roots.at_wall[gap] {
             Some((side, order)) if side == direction => order,
@@ -248,5 +253,16 @@ impl<'a> Moment<'a> {
             Watch::Slips(..) => true,
             _ => false,
         }
+    }
+}
+
+/// Returns where a holding force exceeds its limit, given where it reaches the limit. A force that only touches its limit exceeds it by no
+/// more than rounding.
+fn beyond_rounding(c: &Polynomial, share: f64, size: f64) -> Fall {
+    let mut lifted = *c;
+    lifted[0] = c[0].max(0.0) + ROUNDING * size;
+    match first_fall(&lifted, None, 0, size) {
+        Fall::At(later) if Weights::at(0.5 * (share + later)).of(c)[0] <= 0.0 => Fall::At(share),
+        fall => fall,
     }
 }

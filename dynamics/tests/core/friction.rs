@@ -2,12 +2,16 @@
 
 use std::f64::consts::PI;
 
+use nalgebra::{DMatrix, DVector};
+
 use crate::common::linear::unforced;
 use crate::common::pairs::{AsPair, Friction, Rubbing};
-use crate::common::{REST, apart, near, paper};
-use rattlemap_dynamics::model::{Contact, Domain, Law, Pair, state};
+use crate::common::{BUDGET, REST, apart, near, paper};
+use rattlemap_dynamics::model::{
+    Contact, Domain, Drive, DryFriction, Forces, Form, GapRow, Law, Oscillator, Pair, Timing, state,
+};
 use rattlemap_dynamics::motion::{Flow, GapEvent, Observer, SlipEvent, States, Trajectory};
-use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse_flow};
+use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse_flow, measure};
 
 /// A single mass on a spring without walls, with `m = k = 1`.
 fn block(omega: f64, drive: f64, friction: f64) -> Rubbing {
@@ -54,6 +58,53 @@ fn half_swings_become_shorter_until_the_block_stops() {
         motion.advance_period(&mut slides).unwrap();
     }
     assert_eq!((slides.0.len(), motion.state()), (3, state(&[x])));
+}
+
+/// Load and force together reach the friction force at phase 0, but never exceed it.
+#[test]
+fn friction_as_large_as_the_force_holds_a_chain_of_masses() {
+    let along = |x: f64| DVector::from_fn(3, |i, _| if i == 0 { x } else { 0.0 });
+    let springs = |i: usize, j: usize| [2.0, -1.0, 0.0][i.abs_diff(j)];
+    let stage = Forces {
+        damping: DMatrix::identity(3, 3) * 0.1,
+        stiffness: DMatrix::from_fn(3, 3, springs),
+        load: along(0.6),
+    };
+    for omega in [0.5, 0.6, 0.8, 1.3] {
+        let chain = Oscillator {
+            omega,
+            timing: Timing::Forced,
+            mass: DMatrix::identity(3, 3),
+            stages: vec![stage.clone()],
+            schedule: Vec::new(),
+            drives: vec![Drive { order: 1, cos: along(0.4), sin: along(0.0) }],
+            gaps: vec![GapRow { row: along(1.0), walls: Default::default() }],
+            friction: vec![DryFriction { row: along(1.0), force: 1.0, speed: 0.0 }],
+            signals: Vec::new(),
+        };
+        let (flow, mut slides) = (Flow::new(Form::Machine(chain)), Slides::default());
+        let mut motion = Trajectory::new(&flow, LAW, REST);
+        (0..50).for_each(|_| motion.advance_period(&mut slides).unwrap());
+        assert_eq!((slides.0.len(), motion.state()), (0, REST), "omega = {omega}");
+    }
+}
+
+/// Without damping only the two reversals of a period change areas of the phase plane: each multiplies them by the ratio of the
+/// accelerations after and before it. A slow oscillation about the cycle starts some periods in the other direction of sliding.
+#[test]
+fn the_exponent_of_sliding_follows_from_its_reversals() {
+    for omega in [1.24, 1.6, 1.62] {
+        let flow = Flow::new(block(omega, 1.0, 0.02).form(LAW));
+        let orbit = analyse_flow(&flow, LAW, REST, &Settings::default(), 8);
+        let at = &orbit.slips[0];
+        let push = ((omega * at.t).cos() - at.state[0]).abs();
+        let exact = ((push - 0.02) / (push + 0.02)).ln() / flow.period;
+        let cell = measure(&flow, LAW, REST, &BUDGET);
+        assert_eq!(cell.period, Some(1), "{omega}: {cell:?}");
+        for ours in [orbit.lyapunov, cell.lyapunov.unwrap()[0]] {
+            assert!(near(ours, exact, 1e-9), "{omega}: {ours} but {exact}");
+        }
+    }
 }
 
 /// J. P. den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931) 107: motion without stops. With

@@ -93,6 +93,13 @@ impl<'s> MachineMotion<'s> {
             }
         }
         self.modes.slips = motion.modes.slips;
+        for (element, slip) in system.elements.iter().zip(&mut self.modes.slips) {
+            let [rate, size] = element.rate_and_size(&self.point[system.n..]);
+            if *slip != Slip::Stick && rate.abs() > GAP_ROUNDING * size {
+                // An element that slides may start in the other direction.
+                *slip = Slip::of(rate);
+            }
+        }
         self.has_slid = motion.modes.slips.map(|slip| slip != Slip::Stick);
         self.roots.from_rate = [0; MOST_FRICTION];
         system.hold(&self.modes, &mut self.point, false);
