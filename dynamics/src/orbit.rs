@@ -158,6 +158,8 @@ named! {
         Accelerates = "accelerates",
         /// The motion stays on an unstable cycle, from which no perturbation leads it away within the budget.
         UnstableCycle = "unstable_cycle",
+        /// Two gaps that affect each other reached their walls at the same time, and their order in the model decided the motion.
+        Simultaneous = "simultaneous",
     }
 }
 

@@ -204,6 +204,9 @@ fn status(status: Status) -> &'static str {
         Status::UnstableCycle => {
             "unstable_cycle: the motion stays on an unstable cycle; any perturbation leads it away"
         }
+        Status::Simultaneous => {
+            "simultaneous: two gaps reached their walls together; their order in the model decides"
+        }
         Status::Accelerates => "accelerates: a load accelerates the motion for ever, and nothing opposes it",
     }
 }

@@ -306,7 +306,9 @@ impl Bars<'_> {
                 let is_free = judge.valid & counted == counted
                     && judge.impacts_per_period == 0.0
                     && judge.mesh_fraction == 0.0;
-                statuses[0] == statuses[1] || is_grade && (is_free || !self.is_decisive(judge))
+                // Not every engine notices that two gaps reach their walls together.
+                let is_tied = statuses.contains(&Status::Simultaneous);
+                statuses[0] == statuses[1] || is_tied || is_grade && (is_free || !self.is_decisive(judge))
             }
         }
     }

@@ -41,6 +41,10 @@ pub(super) fn kind(cell: &Cell<'_>, claim: &Record, truth: &Answer, lanes: Repea
     if status(claim).is_failure() {
         return if is_reproduced { Kind::Cap } else { Kind::Unexplained };
     }
+    // Two gaps reached their walls together. Neither order is wrong.
+    if [claim, &truth.record].iter().any(|record| status(record) == Status::Simultaneous) {
+        return Kind::Border;
+    }
     // With early stops, a computation may end before it reaches the cap that its judge reaches.
     if matches!(status(&truth.record), Status::TooStiff | Status::CapEvents) {
         let is_own = lanes.again.is_some_and(|again| again.to_bytes() == claim.to_bytes());

@@ -57,6 +57,7 @@ pub struct MachineMotion<'s> {
     /// Sums of all shifts along rigid-body modes.
     travelled: [f64; MOST_COORDINATES],
     near_grazing: bool,
+    is_tied: bool,
     work: Work,
     allowance: Allowance<'s>,
 }
@@ -140,6 +141,11 @@ impl<'s> MachineMotion<'s> {
     /// Clears the flag of earlier events near to grazing.
     pub fn clear_near_grazing(&mut self) {
         self.near_grazing = false;
+    }
+
+    /// Whether two gaps have reached their walls at the same time since the start, so that their order in the model decided the motion.
+    pub(crate) fn is_tied(&self) -> bool {
+        self.is_tied
     }
 
     /// Returns the counters of work.

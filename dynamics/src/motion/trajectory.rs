@@ -281,6 +281,11 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
+    /// Whether two gaps have reached their walls at the same time since the start, so that their order in the model decided the motion.
+    pub(crate) fn is_tied(&self) -> bool {
+        matches!(&self.motion, Engines::Machine(motion) if motion.is_tied())
+    }
+
     /// Whether any event was so near to grazing that the linearisation is not reliable.
     pub fn near_grazing(&self) -> bool {
         each!(self, motion => motion.near_grazing())

@@ -646,7 +646,9 @@ impl Analysis<'_> {
         cycle: &Cycle,
         distance: f64,
     ) -> Result<Orbit, Stop> {
-        let status = if reading.near_grazing || cycle.near_grazing {
+        let status = if seed.is_tied() || reading.is_tied {
+            Status::Simultaneous
+        } else if reading.near_grazing || cycle.near_grazing {
             Status::NearGrazing
         } else if reading.on_strobe {
             Status::StrobeOnEvent
@@ -719,7 +721,11 @@ impl Analysis<'_> {
         let reading = Reading::take(self.flow, &mut trajectory, self.event_periods, false)?;
         Ok(Orbit {
             class,
-            status: if status == Status::Ok && reading.on_strobe { Status::StrobeOnEvent } else { status },
+            status: match status {
+                Status::Ok if reading.is_tied => Status::Simultaneous,
+                Status::Ok if reading.on_strobe => Status::StrobeOnEvent,
+                status => status,
+            },
             lyapunov: window.lyapunov,
             lyapunov_error: Some(window.lyapunov_error),
             floquet: None,

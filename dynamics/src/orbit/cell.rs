@@ -83,7 +83,7 @@ pub struct Measurement {
 impl Measurement {
     /// Whether aperiodic motion is certainly chaotic or quasi-periodic.
     fn is_decided(&self) -> bool {
-        self.status == Status::Ok && self.lyapunov.is_some()
+        matches!(self.status, Status::Ok | Status::Simultaneous) && self.lyapunov.is_some()
     }
 
     /// Whether aperiodic motion is certainly chaotic.
@@ -179,6 +179,7 @@ fn measure_by_strobes(
         approaches_free: false,
         is_neutral: false,
         is_on_unstable: false,
+        is_tied: false,
         counts: vec![[0.0; 3]],
         itineraries: Vec::new(),
         near_strobe: 0,
@@ -232,6 +233,8 @@ struct CellRun<'a> {
     is_neutral: bool,
     /// Whether the motion lies on an unstable cycle when its budget ends.
     is_on_unstable: bool,
+    /// Whether the order of two gaps has decided the motion.
+    is_tied: bool,
     /// Impacts and meshing time up to each strobe.
     counts: Vec<[f64; 3]>,
     /// Itinerary of each period.
@@ -283,6 +286,7 @@ impl<'a> CellRun<'a> {
         self.itineraries.push(recorder.itinerary);
         self.near_strobe = self.near_strobe << 1 | u16::from(recorder.is_near_strobe);
         self.exponent.renormalise(trajectory);
+        self.is_tied = trajectory.is_tied();
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
         let work = trajectory.work();
@@ -596,6 +600,7 @@ impl<'a> CellRun<'a> {
             true if self.is_on_unstable => Status::UnstableCycle,
             true if self.is_neutral => Status::Neutral,
             true => Status::Slow,
+            false if self.is_tied => Status::Simultaneous,
             false => Status::Ok,
         };
         Measurement {
@@ -603,7 +608,11 @@ impl<'a> CellRun<'a> {
             lyapunov: lyapunov.map(|(mean, error)| [mean, error]),
             impacts_per_period: impacts / span,
             mesh_fraction: share(meshing_time, span * period),
-            ..self.without_results(if is_quasi_periodic { Status::Ok } else { status })
+            ..self.without_results(match is_quasi_periodic {
+                true if self.is_tied => Status::Simultaneous,
+                true => Status::Ok,
+                false => status,
+            })
         }
     }
 

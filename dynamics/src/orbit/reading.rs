@@ -27,6 +27,7 @@ pub(super) struct Reading {
     /// Whether the motion ends in the domain in which it started. The state alone may recur in another domain.
     pub(super) closes: bool,
     pub(super) near_grazing: bool,
+    pub(super) is_tied: bool,
     pub(super) on_strobe: bool,
 }
 
@@ -70,6 +71,7 @@ impl Reading {
             itineraries: recorders.into_iter().map(|recorder| recorder.itinerary).collect(),
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
+            is_tied: trajectory.is_tied(),
             // Rounding may put an event at phase 0 outside the cycle.
             on_strobe: [&first, &*trajectory]
                 .into_iter()

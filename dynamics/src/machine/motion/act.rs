@@ -1,6 +1,7 @@
 //! Events at roots of watches: contacts, impacts, and their reports to observers.
 
 use super::MachineMotion;
+use crate::machine::ROUNDING;
 use crate::machine::domain::STAYS_ZERO;
 use crate::machine::impact::{Impact, Outcome};
 use crate::machine::modes::{AtRest, GapMode, signed};
@@ -13,6 +14,9 @@ use crate::word;
 
 /// Order of the root of the distance when the gap leaves a rigid wall: its acceleration is zero, the derivative is not.
 pub(super) const RELEASE_ORDER: usize = 3;
+
+/// Time between two impacts, in forcing periods, within which their order is not known.
+const TIE: f64 = 1e-12;
 
 impl MachineMotion<'_> {
     /// Processes the root of a watch.
@@ -168,6 +172,7 @@ impl MachineMotion<'_> {
     /// Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
     fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut dyn Observer) {
         let (system, approach) = (self.system, side.sign() * self.rate(gap));
+        self.is_tied |= (0..system.gaps()).any(|other| other != gap && self.arrives_with(gap, other));
         let (modes, point) = (&self.modes, &self.point);
         let impact = Impact { system, modes, point, gap, side, wall, approach };
         let Outcome { modes: next, point, lasts, pressing, jump } = impact.outcome();
@@ -191,6 +196,21 @@ impl MachineMotion<'_> {
             _ => self.leave(gap, side),
         }
         self.before = self.point;
+    }
+
+    /// Whether another gap is about to have an impact, too, and the impact of the first gap changes its rate.
+    fn arrives_with(&self, gap: usize, other: usize) -> bool {
+        let (system, rate) = (self.system, self.rate(other));
+        let side = if rate > 0.0 { Side::Right } else { Side::Left };
+        let m = |i, j| system.mobility[(i, j)];
+        let is_coupled = m(gap, other).abs() > ROUNDING * (m(gap, gap) * m(other, other)).sqrt();
+        is_coupled
+            && rate != 0.0
+            && system.wall_ahead(&self.modes, other, side).is_some_and(|(own, number)| {
+                let wall = &system.walls(other, own)[number];
+                let left = (wall.at - self.point[other]).abs();
+                own == side && !wall.contact.is_elastic() && left <= TIE * system.period * rate.abs()
+            })
     }
 
     pub(super) fn count_event(&mut self) {

@@ -48,6 +48,7 @@ impl<'s> MachineMotion<'s> {
             sticking_time: 0.0,
             travelled: [0.0; MOST_COORDINATES],
             near_grazing: false,
+            is_tied: false,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
         };
@@ -71,6 +72,7 @@ impl<'s> MachineMotion<'s> {
     {
         let mut started = MachineMotion::new(system, &self.state());
         started.take_modes_of(self);
+        started.is_tied = self.is_tied;
         started
     }
 
