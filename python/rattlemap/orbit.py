@@ -307,7 +307,7 @@ def orbit(
         Values by name, for parameters whose names are keywords of this function.
     periods
         Forcing periods to analyse after the transient, 2 to 10,000,000. If the class is not decided then, the motion is
-        undecided. By default 128; while the motion is undecided, the analysis is repeated with twice as many, up to 32,768.
+        undecided. By default 128; while the motion is undecided, the analysis is repeated with twice as many, up to 4,096.
         Cycles of up to half this number, at most 64, are found.
     transient
         Forcing periods before the first analysis, 1 to 1,000,000,000.

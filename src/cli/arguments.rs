@@ -540,7 +540,7 @@ pub(crate) struct Orbit {
 
     /// Number of forcing periods to analyse after the transient, at least 2. Cycles of up to N/2 periods, at most 64, are
     /// found. If the class is not decided then, the motion is undecided [default: 128; while the class is undecided, the
-    /// analysis is repeated with twice as many periods, up to 32768]. Example: --periods 256
+    /// analysis is repeated with twice as many periods, up to 4096]. Example: --periods 256
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=10_000_000))]
     pub(crate) periods: Option<u32>,
 

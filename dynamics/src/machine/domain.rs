@@ -13,7 +13,7 @@ use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
 
 /// Taylor radius: the largest product of a step and the rate of its domain.
-const RADIUS: f64 = 1.6;
+pub(super) const RADIUS: f64 = 1.6;
 
 /// Number of derivatives that are compared with zero. A force on one end of a chain of eight masses appears in the 16th derivative of the
 /// other end.

@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::domain::RADIUS;
 use super::{Numbers, PhasePoint, ROUNDING, SIZE};
 use crate::model::{Contact, Oscillator, RigidMode, RigidModes, Side, Wall};
 
@@ -51,6 +52,8 @@ pub struct Frame {
     pub(super) speed: f64,
     /// Displacement beyond which the motion has escaped.
     pub(super) escape: f64,
+    /// Longest step in any stage and domain.
+    pub(crate) longest_step: f64,
     /// `d = to_flow x`, and its inverse.
     to_flow: DMatrix<f64>,
     pub(super) from_flow: DMatrix<f64>,
@@ -134,6 +137,7 @@ impl Frame {
             length,
             speed: 0.0,
             escape: f64::INFINITY,
+            longest_step: 0.0,
             orders: machine.drives.iter().map(|drive| f64::from(drive.order)).collect(),
             drives: machine.drives.iter().map(|drive| [&back * &drive.cos, &back * &drive.sin]).collect(),
             kicks: (0..machine.gaps.len()).map(kick).collect(),
@@ -147,8 +151,10 @@ impl Frame {
             elements,
             machine,
         };
-        let rates = frame.stages.iter().map(|forces| frame.rate(&forces.stiffness, &forces.damping));
-        frame.speed = length * rates.fold(0.0, f64::max);
+        let rate = |forces: &StageForces| frame.rate(&forces.stiffness, &forces.damping);
+        let rates: Vec<f64> = frame.stages.iter().map(rate).collect();
+        frame.speed = length * rates.iter().copied().fold(0.0, f64::max);
+        frame.longest_step = RADIUS / rates.into_iter().fold(f64::INFINITY, f64::min);
         if frame.can_grow() {
             frame.escape = frame.machine.escape();
         }

@@ -109,6 +109,15 @@ impl Flow {
         }
     }
 
+    /// Returns a lower bound of the number of steps in a forcing period.
+    pub(crate) fn least_steps(&self) -> f64 {
+        self.period
+            / match &self.engine {
+                Engine::Pair(flow) => flow.longest_step(),
+                Engine::Machine(system) => system.longest_step,
+            }
+    }
+
     /// Returns the oscillator in the form that its engine takes.
     pub fn form(&self) -> Form {
         match &self.engine {

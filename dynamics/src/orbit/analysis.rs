@@ -25,8 +25,9 @@ pub(super) const GROWTH_ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
 
-/// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length.
-pub const LONGEST_WINDOW: u32 = 32_768;
+/// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length: with the
+/// default transient 8,764 periods in all.
+pub const LONGEST_WINDOW: u32 = 4096;
 
 /// Growth of a tangent vector, as a logarithm, that no escape from an unstable cycle reaches: it exceeds the ratio of the size of the
 /// motion to rounding errors.
@@ -57,11 +58,17 @@ const APPROACH_CHECKS: u32 = 4;
 pub(super) const ALLOWANCE: Allowance<'static> =
     Allowance { steps: 1_000_000_000, events: 200_000_000, ..Allowance::UNLIMITED };
 
+/// Number of forcing periods for which a motion must be able to pay at least, unless fewer are requested.
+const PLAIN_PERIODS: u32 = 528;
+
+/// Time of a machine's step, in steps of a pair.
+const MACHINE_STEP: f64 = 10.0;
+
 /// Forcing periods between two reports of progress.
 const REPORT_INTERVAL: u64 = 64;
 
-/// Number of steps after which the window of an undecided motion is not extended.
-const EXTENSION_STEPS: u64 = 100_000_000;
+/// Number of steps of a pair after which the window of an undecided motion is not extended.
+const EXTENSION_STEPS: f64 = 1e8;
 
 /// Number of first strobe states that show whether a motion begins on a cycle.
 const FIRST_STROBES: usize = 17;
@@ -74,7 +81,7 @@ const APPROACH_CYCLE_CAP: f64 = 4000.0;
 /// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is confirmed. It is `chaotic`
 /// if the exponent exceeds zero by three standard errors and nearby motions have separated by a factor of `e^40` or
 /// more. It is `quasi-periodic` if the exponent is zero within its error and the section is regular. If none of these
-/// holds after the observed periods, windows of twice the length follow, up to 32,768 periods; after that it is undecided.
+/// holds after the observed periods, windows of twice the length follow, up to 4,096 periods; after that it is undecided.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -267,6 +274,11 @@ impl Analysis<'_> {
     fn run(&self, start: State, periods_run: &mut u64) -> Result<Orbit, Stop> {
         let mut trajectory = Trajectory::new(self.flow, self.law, start).allowing(self.allowance);
         let transient = self.settings.transient_periods;
+        let periods = transient.saturating_add(self.settings.observed_periods).min(PLAIN_PERIODS);
+        let cost = if self.flow.pair().is_some() { 1.0 } else { MACHINE_STEP };
+        if cost * f64::from(periods) * self.flow.least_steps() > self.allowance.steps as f64 {
+            return Err(Stop::TooStiff);
+        }
         let mut first = vec![start];
         for _ in 0..transient {
             trajectory.advance_period(&mut ())?;
@@ -308,7 +320,7 @@ impl Analysis<'_> {
             if !approaches && self.is_quasi_periodic(&window) {
                 return self.aperiodic(trajectory, &window, Class::QuasiPeriodic, Status::Ok);
             }
-            if length >= last || trajectory.work().steps > EXTENSION_STEPS {
+            if length >= last || cost * trajectory.work().steps as f64 > EXTENSION_STEPS {
                 let status = self.undecided_status(&trajectory, &window.metric, &found);
                 return self.aperiodic(trajectory, &window, Class::Undecided, status);
             }

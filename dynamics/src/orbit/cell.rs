@@ -251,6 +251,11 @@ impl<'a> CellRun<'a> {
     fn run(&mut self, start: State) -> Result<Measurement, Stop> {
         let budget = self.budget.periods();
         let last = self.budget.longest();
+        // With early stops, few motions are decided in less than the observed periods.
+        let least = if self.budget.early_stop { self.budget.settings.observed_periods } else { budget };
+        if f64::from(least) * self.analysis.flow.least_steps() > self.allowance.steps as f64 {
+            return Err(Stop::TooStiff);
+        }
         let exponent_from = self.budget.exponent_from();
         let turning_from = if self.budget.exponent { self.budget.tangent_from() } else { last };
         let decided_by = self.budget.decided_by();

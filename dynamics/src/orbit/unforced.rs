@@ -180,13 +180,10 @@ impl Analysis<'_> {
 /// Returns the middle of the longest interval between neighbouring events of a cycle. Of equally long ones, the first kind of event
 /// decides, so that all motions on the cycle find the same state.
 fn middle_of_flight(marks: &[Mark], from: f64, to: f64) -> Option<f64> {
-    let on_cycle = |mark: &&[Mark; 2]| mark[0].time >= from && mark[1].time <= to;
-    let pairs: Vec<&[Mark; 2]> = marks.array_windows::<2>().filter(on_cycle).collect();
-    let length = |pair: &[Mark; 2]| pair[1].time - pair[0].time;
-    let longest = pairs.iter().map(|pair| length(pair)).fold(0.0, f64::max);
-    let first = pairs
-        .into_iter()
-        .filter(|pair| length(pair) > EQUALLY_LONG * longest)
-        .min_by_key(|pair| pair[0].kind)?;
-    Some(0.5 * (first[0].time + first[1].time))
+    let pairs = marks.iter().zip(&marks[1..]).filter(|(begin, end)| begin.time >= from && end.time <= to);
+    let lengths: Vec<(f64, &Mark)> = pairs.map(|(begin, end)| (end.time - begin.time, begin)).collect();
+    let longest = lengths.iter().map(|(length, _)| *length).fold(0.0, f64::max);
+    let long = lengths.into_iter().filter(|(length, _)| *length > EQUALLY_LONG * longest);
+    let (length, begin) = long.min_by_key(|(_, begin)| begin.kind)?;
+    Some(begin.time + 0.5 * length)
 }

@@ -250,6 +250,18 @@ impl PairFlow {
         }
     }
 
+    /// Returns the longest step between the first walls and behind them, in any stage.
+    pub(crate) fn longest_step(&self) -> f64 {
+        let of = |flow: &PairFlow| {
+            let domains = [&flow.free, &flow.meshing[0], &flow.meshing[1]];
+            domains
+                .map(|linear| linear.unit * 2f64.powi(linear.taylor_level as i32))
+                .into_iter()
+                .fold(0.0, f64::max)
+        };
+        self.stages.iter().map(of).fold(of(self), f64::max)
+    }
+
     /// Returns the flow of an interval between neighbouring walls: 0 between the first walls, `n` behind the nth right wall, `-n`
     /// behind the nth left wall. The last wall of a side bounds its last interval.
     #[inline]

@@ -1,10 +1,17 @@
 //! Classification of motions that are difficult to classify.
 
+use nalgebra::{DMatrix, DVector};
+
+use crate::common::linear::{unforced, with_wall};
 use crate::common::{BUDGET, REST, flow_of, paper as cell};
-use rattlemap_dynamics::model::{GearPair, Model, State, Stops, state};
-use rattlemap_dynamics::motion::Trajectory;
+use rattlemap_dynamics::model::{
+    Contact, Domain, Drive, DryFriction, Forces, Form, GapRow, GearPair, Law, Model, Oscillator, Pair, Side,
+    State, Stops, Timing, state,
+};
+use rattlemap_dynamics::motion::{Flow, Trajectory};
 use rattlemap_dynamics::orbit::{
-    Class, EVENT_PERIODS, LONGEST_WINDOW, Orbit, Settings, Status, analyse, analyse_until, measure,
+    Class, EVENT_PERIODS, LONGEST_WINDOW, Orbit, Settings, Status, analyse, analyse_flow, analyse_until,
+    measure,
 };
 
 fn orbit(pair: &GearPair) -> Orbit {
@@ -292,4 +299,40 @@ fn a_symmetric_cycle_with_strobes_in_different_domains_is_found() {
     let orbit = analyse(&pair, REST, &Settings::default()).unwrap();
     assert_eq!((orbit.class, orbit.symmetric), (Class::Periodic { period: 5 }, Some(true)));
     assert_eq!(orbit.word, orbit.word.mirrored());
+}
+
+/// Two equal pendulums, one of which is driven off its resonance, collide for ever.
+#[test]
+fn an_undecided_motion_ends_within_10_000_periods() {
+    let free =
+        Domain { damping: [[0.0; 2]; 2], stiffness: [[1.0, 0.0], [0.0, 1.0]], load: [0.0; 2], preload: 0.0 };
+    let pendulums = Pair { gap: [1.0, -1.0], omega: 0.7, force: [0.1, 0.0], ..unforced(2, free) };
+    let flow = Flow::new(&with_wall(pendulums, Side::Right, 0.0, Contact::Rigid, [0.0; 2]));
+    let orbit = analyse_flow(&flow, Law::both(0.3, 0.0), state(&[1.0]), &Settings::default(), 8);
+    assert_eq!(orbit.class, Class::Undecided);
+    assert!((8_000..=10_000).contains(&orbit.periods_run), "{}", orbit.periods_run);
+}
+
+/// The least mass of the Hilbert matrix is 1e-10.
+#[test]
+fn a_machine_that_is_too_stiff_says_so_at_once() {
+    let mass = DMatrix::from_fn(8, 8, |i, j| 1.0 / (i + j + 1) as f64);
+    let unit = || DVector::from_fn(8, |i, _| if i == 0 { 1.0 } else { 0.0 });
+    let stiffness = DMatrix::identity(8, 8);
+    let machine = Oscillator {
+        omega: 0.8,
+        timing: Timing::Forced,
+        mass,
+        stages: vec![Forces { damping: DMatrix::zeros(8, 8), stiffness, load: DVector::zeros(8) }],
+        schedule: Vec::new(),
+        drives: vec![Drive { order: 1, cos: unit(), sin: DVector::zeros(8) }],
+        gaps: vec![GapRow { row: unit(), walls: Default::default() }],
+        friction: vec![DryFriction { row: unit(), force: 0.1, speed: 0.0 }],
+        signals: Vec::new(),
+    };
+    let (flow, law) = (Flow::new(Form::Machine(machine)), Law::both(0.0, 0.0));
+    let orbit = analyse_flow(&flow, law, REST, &Settings::default(), 8);
+    let cell = measure(&flow, law, REST, &BUDGET);
+    assert_eq!((orbit.status, orbit.periods_run), (Status::TooStiff, 0));
+    assert_eq!((cell.status, cell.periods_run), (Status::TooStiff, 0));
 }
