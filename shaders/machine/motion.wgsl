@@ -654,6 +654,11 @@ fn impact(gap: u32, side: u32) {
     let e = law[0];
     let leaving = e * approach;
     let is_rigid = last_kind(gap, side) == LAST_RIGID;
+    let own = laws[cell.law_index][2u * gap + side];
+    let mesh_speed = own[3];
+    let is_endless = own[1] == 0.0 && mesh_speed <= NO_THRESHOLD * flow.speed;
+    // Speed of the gap at the end of a flight, relative to its leaving speed. Friction along the gap makes it less than 1.
+    var ratio: Real = 1.0;
     var before: State = motion.q;
     var kept = 0u;
     var lasts = false;
@@ -711,7 +716,13 @@ fn impact(gap: u32, side: u32) {
                 }
                 pressing = value;
                 load_point(q);
-                is_slow = leaving <= max(laws[cell.law_index][2u * gap + side][3], lowest_speed(domain, gap));
+                is_slow = leaving <= max(mesh_speed, lowest_speed(domain, gap));
+                let back = reversed_slips(q, gap);
+                let returning = sign_of(side) * product(acceleration_row(domain_of(tried_gaps, back), gap), 0u);
+                ratio = sqrt(max(returning, Real(0.0)) / pressing);
+                // The rest of a series of impacts is short.
+                let is_short = 2.0 * approach < CLOSING_ANGLE * number(domain) * (1.0 - e) * pressing;
+                is_slow = is_slow || is_short && is_endless && !varies && ratio > 0.0;
                 if !is_slow || is_rigid || !(pressing > 0.0) {
                     break;
                 }
@@ -741,8 +752,17 @@ fn impact(gap: u32, side: u32) {
     if !lasts && !(pressing > 0.0) && approach < GRAZING_SPEED * flow.speed {
         tally.grazes += 1u;
     }
+    // The rest of a series is one flight of the same duration and momentum.
+    var longer: Real = 1.0;
+    if lasts && !is_rigid && leaving > mesh_speed && e < 1.0 && ratio > 0.0 {
+        longer = (1.0 + 1.0 / ratio) / (1.0 - e * ratio);
+        for (var i = 0u; i < shape.coordinates; i++) {
+            next[2u * i + 1u] -= sign_of(side) * kick[i] * (longer - 1.0) * leaving;
+        }
+        next[2u * gap + 1u] = -sign_of(side) * longer * leaving;
+    }
     kick_gap = gap;
-    kick_factor = select(1.0 + e + law[1] * approach, Real(1.0), lasts && is_rigid);
+    kick_factor = select(1.0 + longer * (e + law[1] * approach), Real(1.0), lasts && is_rigid);
     motion.q = next;
     count_event(gap, side);
     if !lasts {
@@ -877,6 +897,38 @@ fn slide_after_jump(q: State, jumps: bool, gap: u32, stopped: u32) -> bool {
         }
     }
     return choose(q, false);
+}
+
+// Whether an element reverses in some flights of a series of impacts only.
+var<private> varies: bool;
+
+// Returns the slips in the second half of the flights of a series of impacts, which friction along the gap slows down.
+fn reversed_slips(q: State, gap: u32) -> array<u32, ELEMENT_SLOTS> {
+    var back = tried_slips;
+    varies = false;
+    for (var i = 0u; i < ELEMENTS; i++) {
+        if i >= shape.elements {
+            continue;
+        }
+        let row = AT_ELEMENTS + i * (WIDTH + 1u);
+        var along: Real = 0.0;
+        var size_of_move: Real = 0.0;
+        var rate = number(row + WIDTH - 1u);
+        var size = abs(rate);
+        for (var j = 0u; j < shape.coordinates; j++) {
+            let factor = number(row + 2u * j + 1u);
+            let stopped = q[2u * j + 1u] - kick[j] * q[2u * gap + 1u];
+            along += factor * kick[j];
+            size_of_move += abs(factor * kick[j]);
+            rate += factor * stopped;
+            size += abs(factor * stopped);
+        }
+        if abs(along) > ROUNDING * size_of_move && abs(rate) <= 2.0 * abs(along * q[2u * gap + 1u]) {
+            varies = varies || abs(rate) > ROUNDING * size;
+            back[i] = select(back[i], FORWARD + BACKWARD - back[i], back[i] != STICKS);
+        }
+    }
+    return back;
 }
 
 // Lists all elements at rest: gaps on rigid walls, and elements that stick.

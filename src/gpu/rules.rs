@@ -8,7 +8,7 @@ use rattlemap_dynamics::orbit::{
     LINEAR_TOLERANCE, NEAR_STROBE_TURNS, NEUTRAL_ORDER, ON_STROBE_TURNS, PLAIN_GROWTH, ROUNDING_OF_AVERAGES,
     SHARED_GROWTH,
 };
-use rattlemap_dynamics::pair::NO_THRESHOLD;
+use rattlemap_dynamics::pair::{CLOSING_ANGLE, NO_THRESHOLD};
 use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 
 /// Largest meshing speed at which lanes follow chatter by short flights, relative to half the walls' distance times
@@ -117,6 +117,7 @@ pub(super) fn declarations(precision: Precision) -> String {
     ];
     let reals = [
         ("CHAOS_ERRORS", CHAOS_ERRORS),
+        ("CLOSING_ANGLE", CLOSING_ANGLE),
         ("CORRELATION_MARGIN", CORRELATION_MARGIN),
         ("ESCAPE_GROWTH", ESCAPE_GROWTH),
         ("FOLLOWED_MESH_SPEED", FOLLOWED_MESH_SPEED),

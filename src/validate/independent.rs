@@ -64,8 +64,6 @@ struct Strobed<'a> {
 #[derive(Clone, Debug, Default)]
 struct Tally {
     impacts: usize,
-    /// Whether an infinite series of impacts was replaced by its limit, so that `impacts` is too small.
-    series: bool,
     /// Time in contact, in radians of the forcing.
     meshing_time: f64,
     symbols: Vec<u8>,
@@ -250,12 +248,7 @@ fn cycle(on: &Strobed, period: u32, units: [f64; 2]) -> Option<Record> {
     };
     let word = Word::cyclic(&tally.symbols);
     record.set_pattern(&word.pattern());
-    // If an infinite series of impacts was replaced by its limit, the number of impacts is unknown.
-    if tally.series {
-        record.valid &= !valid::IMPACTS;
-    } else {
-        record.set_word(&word);
-    }
+    record.set_word(&word);
     if radius > LEAST_MULTIPLIER {
         record.valid |= valid::LYAPUNOV;
     }
@@ -286,7 +279,7 @@ fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
     let mean = growth.iter().sum::<f64>() / growth.len().max(1) as f64;
     let error = standard_error(&growth);
     let (span, tally) = (f64::from(periods), &motion.flight.tally);
-    let mut record = Record {
+    let record = Record {
         lyapunov: mean / motion.period,
         lyapunov_error: error / motion.period,
         impacts_per_period: tally.impacts as f64 / span,
@@ -295,8 +288,5 @@ fn chaos(mut motion: Strobed, periods: u32, units: [f64; 2]) -> Option<Record> {
         valid: valid::PERIOD | valid::LYAPUNOV | valid::IMPACTS | valid::MESH,
         ..Record::default()
     };
-    if tally.series {
-        record.valid &= !valid::IMPACTS;
-    }
     (mean > CHAOS_ERRORS * error).then_some(record)
 }

@@ -214,11 +214,7 @@ fn check_judge(seeds: std::ops::Range<u32>) {
             flight.advance(0.0, std::f64::consts::TAU)?;
             let state = trajectory.unshifted_state();
             let scale = state.iter().fold(cell.oscillator.length_scale(), |m, x| m.max(x.abs()));
-            let counts = match flight.cuts_series() {
-                true => [0; 2],
-                false => [events.len(), flight.events.len()],
-            };
-            Some((seed, apart(flight.state(), state) / scale, counts))
+            Some((seed, apart(flight.state(), state) / scale, [events.len(), flight.events.len()]))
         })
         .collect();
     let differ: Vec<_> = off

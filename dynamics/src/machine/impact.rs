@@ -41,7 +41,7 @@ type Kick = (Numbers, [bool; MOST_GAPS]);
 
 impl Impact<'_> {
     /// Returns the leaving speed of a flight of the height [`LOWEST_FLIGHT`].
-    fn lowest_speed(&self, domain: &LinearDomain, gap: usize, point: &PhasePoint) -> f64 {
+    pub(super) fn lowest_speed(&self, domain: &LinearDomain, gap: usize, point: &PhasePoint) -> f64 {
         let pressing = domain.accelerations[gap].dot(point).abs();
         (2.0 * LOWEST_FLIGHT * self.system.length * pressing).sqrt()
     }
@@ -122,7 +122,7 @@ impl Impact<'_> {
     }
 
     /// Returns the kick while other gaps rest on rigid walls. A gap stays at rest if its wall pushes, or if it is in `kept`.
-    fn joint_impact(&self, kept: [bool; MOST_GAPS]) -> Kick {
+    pub(super) fn joint_impact(&self, kept: [bool; MOST_GAPS]) -> Kick {
         let none = [false; MOST_GAPS];
         let mut resting = self.modes.gaps.map(GapMode::rest);
         resting[self.gap] = None;

@@ -3,6 +3,7 @@
 //! Observers are trait objects, so that the program has one copy of this code.
 
 mod act;
+mod series;
 mod settle;
 mod start;
 mod tangents;
@@ -400,6 +401,12 @@ impl<'s> MachineMotion<'s> {
         }
         if let Some((row, field)) = linearised {
             self.saltate(watch, &row, &field);
+        }
+        if let (Watch::Wall(gap, side), [(hit, _)]) = (watch, &self.jumps[..])
+            && gap == *hit
+            && self.modes.gaps[gap] == self.system.before_last(gap, side)
+        {
+            self.close_series(gap, side, observer);
         }
     }
 }

@@ -92,7 +92,8 @@ impl<const N: usize> PairMotion<'_, N> {
         let s = side.sign();
         let pressing_rate = s * sliding.acceleration_rate;
         let per_speed = (1.0 - 2.0 * bend * whole) * whole / leaving;
-        let per_pressing = whole / pressing;
+        let per_pressing =
+            (1.0 - (pressing_rate / pressing + sliding.damping / 3.0) * whole) * whole / pressing;
         let pressing_at_end = pressing + duration * pressing_rate;
         let is_rigid = flow.contacts[side.index()] == Contact::Rigid;
         self.tangents = self.tangents.map(|[dz, dw, dx, dv]| {

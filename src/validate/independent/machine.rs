@@ -93,6 +93,17 @@ struct Gap {
     from_force: usize,
     /// Side of the wall of the gap's last event.
     origin: Option<Side>,
+    series: Series,
+}
+
+/// The stage of a series of impacts. Impacts are counted until the rest is short. Then they are followed to the limit, which counts as one
+/// event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Series {
+    Long,
+    /// The next impact is not counted.
+    Short,
+    Uncounted,
 }
 
 /// Returns a number of walls with the sign of the side.
@@ -173,7 +184,14 @@ impl Flight {
     /// Builds a motion that starts at phase 0. A gap beyond a rigid wall is moved to this wall.
     pub fn new(machine: &Oscillator, start: &State) -> Flight {
         let system = Rc::new(System::new(machine, start));
-        let gap = Gap { level: 0, mode: Mode::Plain, on_wall: None, from_force: 0, origin: None };
+        let gap = Gap {
+            level: 0,
+            mode: Mode::Plain,
+            on_wall: None,
+            from_force: 0,
+            origin: None,
+            series: Series::Long,
+        };
         let mut flight = Flight {
             stage: machine.first_stage(),
             gaps: [gap; MOST_GAPS],
@@ -192,11 +210,6 @@ impl Flight {
     /// Returns the state `(x1, v1, x2, v2, ...)`.
     pub fn state(&self) -> State {
         self.system.to_state(&self.y)
-    }
-
-    /// Whether an infinite series of impacts was replaced by its limit, so that not all impacts are listed.
-    pub fn cuts_series(&self) -> bool {
-        self.tally.series
     }
 
     /// Returns the side of a gap's lasting contact.

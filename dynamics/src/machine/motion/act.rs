@@ -261,7 +261,7 @@ impl MachineMotion<'_> {
             before: [self.before[gap], self.before[n + gap], 0.0, 0.0],
             after: [self.point[gap], self.point[n + gap], 0.0, 0.0],
             meshing,
-            has_impact: !place.contact.is_elastic() && kind != EventKind::MeshEnd,
+            has_impact: !place.contact.is_elastic() && kind != EventKind::MeshEnd && !self.jumps.is_empty(),
             code: of_wall + 4 * kind as u64 + 256 * (gap + 4 * wall) as u64,
             interval: 0,
             ends_series: false,

@@ -96,7 +96,7 @@ impl MachineMotion<'_> {
     }
 
     /// Projects the tangents onto the constraints, because neighbouring motions rest, too.
-    fn hold_tangents(&mut self) {
+    pub(super) fn hold_tangents(&mut self) {
         for tangent in &mut self.tangents {
             for (entry, mode) in tangent.iter_mut().zip(self.modes.gaps).take(self.system.gaps()) {
                 if mode.rest().is_some() {

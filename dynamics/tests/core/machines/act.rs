@@ -1,12 +1,16 @@
 //! Changes of modes, state and tangents at events of a machine.
 
-use rattlemap_dynamics::model::{Contact, Side};
+use rattlemap_dynamics::model::{Contact, DryFriction, Side};
 
-use super::motion::{End, Event, Gap, Mode, Motion, What, side_of, step_of};
+use super::motion::{End, Event, Gap, Mode, Motion, Series, What, side_of, step_of};
 use super::system::{Functional, Grip, Linear, Matrix, ROUNDING, Vector};
 
-/// Height of flights, in scales of length, that end a series of impacts.
+/// Height of flights, in scales of length, that are counted and followed.
 const LOWEST_FLIGHT: f64 = 1e-13;
+const DEEPEST_FLIGHT: f64 = 1e-16;
+
+/// Duration of the rest of a series of impacts, in radians of the fastest rate, whose impacts are not counted.
+const SHORT_REST: f64 = 1.6e-4;
 
 /// After this number of simultaneous events, an impact shows that impacts of several gaps follow each other without end.
 const CROWD: usize = 4;
@@ -150,6 +154,9 @@ impl Motion<'_> {
         for (i, &before) in before.iter().enumerate() {
             let after = self.grips[i];
             if after != Grip::Stick && after != before && (before == Grip::Stick || cause == Some(i)) {
+                if self.gaps.iter().any(|gap| gap.series == Series::Uncounted) {
+                    continue;
+                }
                 let symbol = if before == Grip::Stick { b'7' } else { b'0' };
                 self.slips.push((symbol, self.time()));
                 // The symbol of the cause comes before that of the gap.
@@ -397,18 +404,22 @@ impl Motion<'_> {
             motion.begin_slides(&joint.change, (1.0 + e) * closing);
             motion.decide();
         };
-        let limit = |motion: &Self, gap: usize| {
-            let acceleration = motion.of(&motion.linear().acceleration[gap]).abs();
-            (2.0 * LOWEST_FLIGHT * system.length * acceleration).sqrt()
+        let acceleration = |motion: &Self, gap: usize| motion.of(&motion.linear().acceleration[gap]).abs();
+        let limit = |motion: &Self, gap: usize, height: f64| {
+            (2.0 * height * system.length * acceleration(motion, gap)).sqrt()
         };
         // The rest of a series of impacts is one flight of the same duration and momentum.
         let whole = if e * closing > wall.mesh_speed && e < 1.0 { 2.0 / (1.0 - e) } else { 1.0 };
         let (mut keep, mut joint) = (Vec::new(), self.joint(i, side, &[]));
-        let mut lasts;
+        let (mut lasts, mut later, mut reverses);
         loop {
             lasts = false;
             after(self, &joint, e, Mode::Plain);
-            if e * closing <= wall.mesh_speed.max(limit(self, i)) {
+            later = 2.0 * e * closing / ((1.0 - e) * acceleration(self, i));
+            reverses = self.reverses(&joint.change, s * e * closing);
+            // At a reversal, the height of a flight loses digits.
+            let deepest = if reverses.is_none() { DEEPEST_FLIGHT } else { LOWEST_FLIGHT };
+            if e * closing <= wall.mesh_speed.max(limit(self, i, deepest)) {
                 if wall.contact == Contact::Rigid {
                     after(self, &joint, 0.0, Mode::Stuck(side));
                     lasts = matches!(self.gaps[i].mode, Mode::Stuck(_));
@@ -427,10 +438,9 @@ impl Motion<'_> {
             }
             // Gaps whose flight would be too low stay at rest; otherwise impacts of two gaps could alternate for ever.
             let linear = self.linear();
-            let low = joint
-                .released
-                .iter()
-                .find(|&&(j, own)| self.presses(&linear, j, own) && -self.rate(j, own) <= limit(self, j));
+            let low = joint.released.iter().find(|&&(j, own)| {
+                self.presses(&linear, j, own) && -self.rate(j, own) <= limit(self, j, LOWEST_FLIGHT)
+            });
             let Some(&(j, _)) = low else { break };
             self.corners += 1;
             keep.push(j);
@@ -441,8 +451,33 @@ impl Motion<'_> {
         } else if lasts {
             (e, slope) = (whole * e, whole * slope);
         }
-        let what = if lasts { What::Begins } else { What::Impact };
-        self.record_as(i, what, side, symbol(&start.gaps[i], side));
+        let is_slow = wall.mesh_speed < e * closing && e * closing <= limit(self, i, LOWEST_FLIGHT);
+        let presses = !lasts && e < 1.0 && self.presses(&self.linear(), i, side);
+        let before = start.gaps[i].series;
+        let ends = before == Series::Short || is_slow;
+        if before != Series::Uncounted {
+            let what = if lasts || presses && ends { What::Begins } else { What::Impact };
+            self.record_as(i, what, side, symbol(&start.gaps[i], side));
+        }
+        let t = self.time() + later;
+        if let Some(event) = self.events.iter_mut().rfind(|event| event.gap == i)
+            && lasts
+            && before == Series::Uncounted
+        {
+            event.t = t;
+        }
+        self.gaps[i].series = match before {
+            _ if !presses => Series::Long,
+            Series::Long if !is_slow => {
+                let is_endless =
+                    slope == 0.0 && wall.mesh_speed == 0.0 && later < SHORT_REST * self.linear().radian;
+                // The limit under friction along the gap is tested elsewhere.
+                self.is_crowded |= is_endless && reverses == Some(0.0);
+                let is_short = is_endless && reverses.is_none();
+                if is_short { Series::Short } else { Series::Long }
+            }
+            _ => Series::Uncounted,
+        };
         if !lasts {
             self.leave(i, side, e == 0.0);
         } else if matches!(self.gaps[i].mode, Mode::Stuck(_)) {
@@ -452,6 +487,19 @@ impl Motion<'_> {
         let mut velocities = reset.view_mut((n, n), (n, n));
         velocities -= &joint.change * gap.row.transpose() * (1.0 + e + slope * closing);
         reset
+    }
+
+    /// Returns the largest sliding rate of an element that would reverse while a gap with this rate comes to rest in impacts; none if all
+    /// slide on.
+    fn reverses(&self, kick: &Vector, rate: f64) -> Option<f64> {
+        let n = self.system.degrees;
+        let velocities = self.y.rows(n, n) + kick * rate;
+        let slides = |friction: &DryFriction| {
+            let (along, size) = (friction.row.dot(kick).abs(), friction.row.norm() * kick.norm());
+            let slides = (friction.row.dot(&velocities) - friction.speed).abs();
+            (along > ROUNDING * size && slides <= 2.0 * along * rate.abs()).then_some(slides)
+        };
+        self.system.machine.friction.iter().filter_map(slides).reduce(f64::max)
     }
 
     /// Begins to slide after an impact that has changed the rate of a gap. Gaps that friction holds on a wall may move.

@@ -32,8 +32,10 @@ type Strobe = (Vec<f64>, Vec<Mode>, Vec<Grip>);
 #[derive(Clone, Debug)]
 pub(crate) struct Cycle {
     pub(crate) strobes: Vec<Strobe>,
-    /// Largest modulus of the multipliers, except multipliers of elements that stick for ever.
+    /// Largest modulus of the multipliers, except multipliers of elements that stick for ever and of conserved momenta.
     pub(crate) radius: f64,
+    /// Mean rates of the coordinates along directions in which nothing holds the machine.
+    pub(crate) drift: Vector,
     /// None if events of two gaps are simultaneous.
     pub(crate) word: Option<Word>,
     pub(crate) impacts: usize,
@@ -102,8 +104,11 @@ pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
         motion.advance_period()?;
         noise = noise.max(motion.noise(&mut shaken)?);
     }
+    let mut multipliers: Vec<_> = motion.derivative().complex_eigenvalues().iter().copied().collect();
+    multipliers.sort_by(|a, b| (a - 1.0).norm().total_cmp(&(b - 1.0).norm()));
     Some(Cycle {
-        radius: motion.derivative().complex_eigenvalues().iter().map(|m| m.norm()).fold(0.0, f64::max),
+        radius: multipliers[system.conserved..].iter().map(|m| m.norm()).fold(0.0, f64::max),
+        drift: &motion.travelled / (period as f64 * system.period),
         word: word(&motion),
         impacts: motion.events.iter().filter(|event| event.what == What::Impact).count(),
         meshes: motion.meshing_time / (period as f64 * system.period),
@@ -125,9 +130,11 @@ fn newton(near: &Motion, period: usize) -> Option<Cycle> {
     for _ in 0..12 {
         let from = at.state();
         let (to, derivative) = image(&mut at.clone(), period)?;
+        // A conserved momentum stays as it is.
         let step = (Matrix::identity(to.len(), to.len()) - derivative)
-            .lu()
-            .solve(&(to - DVector::from_vec(from.clone())))?;
+            .svd(true, true)
+            .solve(&(to - DVector::from_vec(from.clone())), 1e-9)
+            .ok()?;
         let next: Vec<f64> = from.iter().zip(&step).map(|(from, step)| from + step).collect();
         at.set_state(&next);
         if apart(&next, &from, rate) < 1e-14 {

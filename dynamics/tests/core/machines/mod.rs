@@ -14,4 +14,5 @@ pub(crate) mod motion;
 pub(crate) mod random;
 mod rest;
 mod roots;
+mod series;
 pub(crate) mod system;

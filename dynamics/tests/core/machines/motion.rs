@@ -65,6 +65,17 @@ pub(super) struct Gap {
     pub(super) is_unpressed: bool,
     /// The wall of the last event.
     pub(super) origin: Option<Side>,
+    /// The stage of a series of impacts.
+    pub(super) series: Series,
+}
+
+/// Impacts are counted until the rest of their series is short. Then they are followed to the limit, which counts as one event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Series {
+    Long,
+    /// The next impact is not counted.
+    Short,
+    Uncounted,
 }
 
 /// The end of a flight.
@@ -106,6 +117,8 @@ pub(crate) struct Motion<'a> {
     pub(crate) symbols: Vec<u8>,
     /// Time in which a gap has been in contact, which the caller may clear.
     pub(crate) meshing_time: f64,
+    /// Sum of all shifts back at the ends of periods, which the caller may clear.
+    pub(crate) travelled: Vector,
     /// Distances that the elements have slid, which the caller may clear.
     pub(crate) slid: Vec<f64>,
     /// Elements that never slide, so that neighbouring motions keep their distance along them.
@@ -159,6 +172,7 @@ impl<'a> Motion<'a> {
             is_unloaded: false,
             is_unpressed: false,
             origin: None,
+            series: Series::Long,
         };
         let mut motion = Motion {
             system,
@@ -174,6 +188,7 @@ impl<'a> Motion<'a> {
             slips: Vec::new(),
             symbols: Vec::new(),
             meshing_time: 0.0,
+            travelled: DVector::zeros(machine.degrees()),
             slid: vec![0.0; machine.friction.len()],
             for_good: vec![false; machine.friction.len()],
             by_stage: [0; 2],
@@ -221,6 +236,7 @@ impl<'a> Motion<'a> {
     pub(crate) fn clear(&mut self) {
         (self.events, self.slips, self.symbols) = Default::default();
         self.meshing_time = 0.0;
+        self.travelled.fill(0.0);
         self.slid.fill(0.0);
     }
 
@@ -397,8 +413,20 @@ impl<'a> Motion<'a> {
         }
     }
 
+    /// Begins a period, after a shift back along directions in which nothing holds the machine.
     fn begin_period(&mut self) {
         self.t = 0.0;
+        let n = self.system.degrees;
+        for along in &self.system.shifts {
+            let by = along.dot(&self.y.rows(0, n));
+            self.y.rows_mut(0, n).axpy(-by, along, 1.0);
+            self.travelled.axpy(by, along, 1.0);
+            self.tangents.iter_mut().for_each(|tangents| {
+                let change = along * (along.transpose() * tangents.rows(0, n));
+                let mut of_x = tangents.rows_mut(0, n);
+                of_x -= change;
+            });
+        }
         let one = 2 * self.system.degrees;
         self.y[one] = 1.0;
         for i in 0..self.system.machine.drives.len() {

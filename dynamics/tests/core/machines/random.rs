@@ -28,6 +28,18 @@ pub(crate) struct Case {
     pub(crate) start: Vec<f64>,
 }
 
+/// A structure that random machines may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Structure {
+    Any,
+    /// Nothing holds it in one direction. If it is not damped there, its momentum is conserved.
+    Drifting {
+        is_damped: bool,
+    },
+    /// It is its own mirror image half a period later.
+    Symmetric,
+}
+
 type Vector = DVector<f64>;
 type Matrix = DMatrix<f64>;
 
@@ -72,10 +84,10 @@ fn row(random: &mut Random, n: usize) -> Vector {
 }
 
 /// Returns the mean and the amplitude of a gap in motion without walls.
-fn reach(machine: &Oscillator, row: &Vector) -> [f64; 2] {
+fn reach(machine: &Oscillator, row: &Vector, rest: &Vector) -> [f64; 2] {
     let (n, forces) = (machine.degrees(), &machine.stages[0]);
     let solved = |m: Matrix, f: Vector| m.lu().solve(&f).unwrap_or_else(|| Vector::zeros(f.len()));
-    let mean = row.dot(&solved(forces.stiffness.clone(), forces.load.clone()));
+    let mean = row.dot(rest);
     let of = |drive: &Drive| {
         let rate = f64::from(drive.order) * machine.omega;
         let (dynamic, damping) = (&forces.stiffness - &machine.mass * (rate * rate), &forces.damping * rate);
@@ -134,6 +146,12 @@ fn walls(random: &mut Random, machine: &Oscillator, count: usize, at: f64, s: f6
 
 /// Returns the machine of a seed.
 pub(crate) fn case(seed: u64, shape: Shape) -> Case {
+    case_of(Structure::Any, seed, shape)
+}
+
+/// Returns the machine of a seed with a structure.
+pub(crate) fn case_of(structure: Structure, seed: u64, shape: Shape) -> Case {
+    let is_symmetric = structure == Structure::Symmetric;
     let random = &mut Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x5851_f42d_4c95_7f2d);
     let n = shape.coordinates;
     let masses: Vec<f64> = (0..n).map(|_| random.logarithmic(0.5, 2.0)).collect();
@@ -165,8 +183,33 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
             load: &first.load + if random.chance(0.5) { Vector::zeros(n) } else { vector(random, n, 4.0) },
         });
     }
+    let direction = matches!(structure, Structure::Drifting { .. }).then(|| match random.chance(0.5) {
+        true => Vector::from_element(n, 1.0),
+        false => Vector::from_fn(n, |_, _| random.between(0.5, 2.0) * [1.0, -1.0][random.below(2)]),
+    });
+    let across = direction.map(|d| Matrix::identity(n, n) - &d * d.transpose() / d.norm_squared());
+    let projected = |x: &Vector| across.as_ref().map_or_else(|| x.clone(), |across| across * x);
+    if let Some(across) = &across {
+        for Forces { damping, stiffness, load } in &mut stages {
+            let free = across * &*stiffness * across;
+            *stiffness = 0.5 * (&free + free.transpose());
+            if structure == (Structure::Drifting { is_damped: false }) {
+                (*damping, *load) = (across * &*damping * across, across * &*load);
+            }
+        }
+    }
+    if is_symmetric {
+        stages.iter_mut().for_each(|forces| forces.load.fill(0.0));
+    }
     let schedule = match shape.stages {
         1 => Vec::new(),
+        count if is_symmetric => {
+            let mut phases: Vec<f64> = (0..count).map(|_| random.between(0.0, 0.5)).collect();
+            phases.sort_by(f64::total_cmp);
+            let half =
+                |by: f64| phases.iter().enumerate().map(move |(i, phase)| (phase + by, (i + 1) % count));
+            half(0.0).chain(half(0.5)).collect()
+        }
         count => {
             let mut phases: Vec<f64> = (0..count + random.below(3)).map(|_| random.unit()).collect();
             if random.chance(0.4) {
@@ -181,6 +224,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     orders.push(1);
     orders.sort_unstable();
     orders.dedup();
+    orders.retain(|order| !is_symmetric || order % 2 == 1);
     let drive = |order: u32| Drive {
         order,
         cos: vector(random, n, 8.0),
@@ -201,14 +245,24 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     };
     let mut rows: Vec<Vector> = Vec::new();
     while rows.len() < shape.gaps {
-        rows.push(row(random, n));
-        if !are_independent(&rows) {
+        rows.push(projected(&row(random, n)));
+        if rows[rows.len() - 1].norm() < 0.2 {
+            rows.pop();
+        } else if !are_independent(&rows) {
             rows.pop();
         }
     }
+    let forces = &machine.stages[0];
+    let rest = match &across {
+        None => forces.stiffness.clone().lu().solve(&forces.load).expect("a stiffness"),
+        Some(across) => {
+            let svd = forces.stiffness.clone().svd(true, true);
+            svd.solve(&(across * &forces.load), 1e-9).expect("both factors")
+        }
+    };
     let mut speeds = 0.0f64;
     for row in &rows {
-        let [mean, amplitude] = reach(&machine, row);
+        let [mean, amplitude] = reach(&machine, row, &rest);
         // Not every gap has a large part in the motion.
         let amplitude = amplitude.max(0.05);
         let speed = amplitude * omega;
@@ -219,19 +273,31 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
             let count = if has[side.index()] { 1 + random.below(shape.walls) } else { 0 };
             walls(random, &machine, count, at, side.sign(), speed)
         };
-        let walls = Side::BOTH.map(of);
+        let mut walls = Side::BOTH.map(of);
+        if is_symmetric {
+            let from = usize::from(walls[0].is_empty());
+            walls[1 - from] = walls[from].iter().map(|wall| Wall { at: -wall.at, ..wall.clone() }).collect();
+        }
         machine.gaps.push(GapRow { row: row.clone(), walls });
     }
     add_friction(random, &mut machine, shape.friction, &rows, speeds);
+    for friction in &mut machine.friction {
+        if structure == (Structure::Drifting { is_damped: false }) {
+            friction.row = projected(&friction.row);
+        }
+        if is_symmetric {
+            friction.speed = 0.0;
+        }
+    }
+    machine.friction.retain(|friction| friction.row.norm() > 0.2);
     if machine.friction.len() > 1 {
         // Two elements of friction and a rigid wall are refused.
         let walls = machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten());
         walls.filter(|wall| wall.contact == Contact::Rigid).for_each(|wall| wall.contact = Contact::Impact);
     }
     machine.validate().unwrap_or_else(|error| panic!("{seed}: {error}: {machine:?}"));
-    let forces = &machine.stages[0];
-    let x = forces.stiffness.clone().lu().solve(&forces.load).expect("a stiffness");
-    let start = (0..2 * n).map(|i| if i % 2 == 0 { x[i / 2] } else { random.even(0.7 * speeds) }).collect();
+    let start =
+        (0..2 * n).map(|i| if i % 2 == 0 { rest[i / 2] } else { random.even(0.7 * speeds) }).collect();
     Case { machine, start }
 }
 
@@ -278,9 +344,28 @@ const SHAPES: [Shape; 10] = [
     Shape { coordinates: 8, gaps: 3, harmonics: 4, stages: 2, friction: 2, walls: 4 },
 ];
 
+/// Shapes with more coordinates than gaps.
+const STRUCTURED: [Shape; 8] = [
+    Shape { coordinates: 2, gaps: 1, harmonics: 1, stages: 1, friction: 0, walls: 1 },
+    Shape { coordinates: 2, gaps: 1, harmonics: 2, stages: 2, friction: 0, walls: 2 },
+    Shape { coordinates: 2, gaps: 1, harmonics: 1, stages: 1, friction: 2, walls: 1 },
+    Shape { coordinates: 3, gaps: 2, harmonics: 3, stages: 1, friction: 1, walls: 2 },
+    Shape { coordinates: 3, gaps: 1, harmonics: 1, stages: 2, friction: 1, walls: 1 },
+    Shape { coordinates: 4, gaps: 3, harmonics: 1, stages: 1, friction: 0, walls: 1 },
+    Shape { coordinates: 5, gaps: 2, harmonics: 2, stages: 2, friction: 0, walls: 2 },
+    Shape { coordinates: 8, gaps: 3, harmonics: 4, stages: 2, friction: 1, walls: 2 },
+];
+
 /// Returns the shape and the machine of a seed.
 pub(crate) fn any_case(seed: u64) -> Case {
     case(seed, SHAPES[(seed % SHAPES.len() as u64) as usize])
+}
+
+/// Returns the machine of a seed: in turn one that drifts, a symmetric one, and any.
+pub(crate) fn structured_case(seed: u64) -> Case {
+    let shape = STRUCTURED[(seed / 3 % STRUCTURED.len() as u64) as usize];
+    let structures = [Structure::Drifting { is_damped: seed % 2 == 0 }, Structure::Symmetric, Structure::Any];
+    case_of(structures[(seed % 3) as usize], seed, shape)
 }
 
 /// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.

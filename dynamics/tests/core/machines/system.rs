@@ -52,6 +52,8 @@ pub(crate) struct Linear {
     pub(crate) a: Matrix,
     /// Length of a step and its exponential.
     pub(crate) step: (f64, Matrix),
+    /// Time in which the fastest rate turns by one radian.
+    pub(crate) radian: f64,
     /// Accelerations of the gaps. They are 0 for gaps at rest.
     pub(crate) acceleration: Vec<Functional>,
     /// For each gap at rest on a rigid wall, its acceleration if this wall were absent and everything else at rest stayed at rest.
@@ -122,6 +124,14 @@ pub(crate) fn product(a: &Matrix, b: &Matrix) -> Matrix {
     all
 }
 
+/// Returns unit vectors that span the vectors which all matrices map to 0.
+fn null_space(matrices: &[Matrix]) -> Vec<Vector> {
+    let scaled = matrices.iter().filter(|m| m.amax() > 0.0).map(|m| m.transpose() * m / m.amax().powi(2));
+    let eigen = scaled.reduce(|a, b| a + b).expect("a matrix").symmetric_eigen();
+    let small = (0..eigen.eigenvalues.len()).filter(|&i| eigen.eigenvalues[i].abs() < 1e-14);
+    small.map(|i| eigen.eigenvectors.column(i).into_owned()).collect()
+}
+
 /// Returns the largest sum of the entries' sizes in a row.
 fn norm(a: &Matrix) -> f64 {
     a.row_iter().map(|row| row.abs().sum()).fold(0.0, f64::max)
@@ -139,6 +149,9 @@ pub(crate) struct System {
     /// The length that the limit of short flights is relative to.
     pub(crate) length: f64,
     pub(crate) per_mass: Matrix,
+    /// Unit vectors along which nothing holds the machine to the ground, and those along which nothing damps it, either.
+    pub(crate) shifts: Vec<Vector>,
+    pub(crate) conserved: usize,
     /// Rows of the gaps and of their rates.
     pub(crate) z: Vec<Functional>,
     pub(crate) w: Vec<Functional>,
@@ -159,6 +172,8 @@ impl System {
             period: machine.period(),
             length: machine.length_scale(),
             per_mass: machine.mass.clone().try_inverse().expect("a mass matrix"),
+            shifts: Vec::new(),
+            conserved: 0,
             z: Vec::new(),
             w: Vec::new(),
             slides: Vec::new(),
@@ -175,6 +190,14 @@ impl System {
         };
         let slides = system.machine.friction.iter().map(slide).collect();
         (system.z, system.w, system.slides) = (z, w, slides);
+        let as_row = |row: &Vector| Matrix::from_rows(&[row.transpose()]);
+        let stages = || system.machine.stages.iter();
+        let mut held: Vec<Matrix> = stages().map(|forces| forces.stiffness.clone()).collect();
+        held.extend(system.machine.gaps.iter().map(|gap| as_row(&gap.row)));
+        let mut damped = held.clone();
+        damped.extend(stages().flat_map(|forces| [forces.damping.clone(), forces.damping.transpose()]));
+        damped.extend(system.machine.friction.iter().map(|friction| as_row(&friction.row)));
+        (system.shifts, system.conserved) = (null_space(&held), null_space(&damped).len());
         system
     }
 
@@ -231,8 +254,8 @@ impl System {
         a
     }
 
-    /// Returns the generator without anything at rest, and its fastest rate.
-    fn generator(&self, key: &Key) -> (Matrix, f64) {
+    /// Returns the generator without anything at rest, a bound on its fastest rate, and the fastest rate by singular values.
+    fn generator(&self, key: &Key) -> (Matrix, [f64; 2]) {
         let (n, machine) = (self.degrees, &self.machine);
         let forces = &machine.stages[key.stage];
         let (mut stiffness, mut damping) = (forces.stiffness.clone(), forces.damping.clone());
@@ -252,7 +275,7 @@ impl System {
         }
         let mut a = Matrix::zeros(self.size(), self.size());
         a.view_mut((0, n), (n, n)).fill_with_identity();
-        let (of_x, of_v) = (&self.per_mass * stiffness, &self.per_mass * damping);
+        let (of_x, of_v) = (&self.per_mass * &stiffness, &self.per_mass * &damping);
         a.view_mut((n, 0), (n, n)).copy_from(&-&of_x);
         a.view_mut((n, n), (n, n)).copy_from(&-&of_v);
         a.view_mut((n, 2 * n), (n, 1)).copy_from(&(&self.per_mass * load));
@@ -263,9 +286,12 @@ impl System {
             let rate = f64::from(drive.order) * machine.omega;
             (a[(cos, sin)], a[(sin, cos)]) = (-rate, rate);
         }
-        let fastest =
-            (norm(&of_x).sqrt() + norm(&of_v)).max(f64::from(machine.highest_order()) * machine.omega);
-        (a, fastest)
+        let of_force = f64::from(machine.highest_order()) * machine.omega;
+        let factor =
+            machine.mass.clone().cholesky().expect("a mass matrix").l().try_inverse().expect("its factor");
+        let own = |m: &Matrix| (&factor * m * factor.transpose()).singular_values().max();
+        let rates = [norm(&of_x).sqrt() + norm(&of_v), own(&stiffness).sqrt() + own(&damping)];
+        (a, rates.map(|rate| rate.max(of_force)))
     }
 
     pub(crate) fn domain(&self, key: &Key) -> Rc<Linear> {
@@ -280,7 +306,7 @@ impl System {
     fn build(&self, key: &Key) -> Linear {
         let (machine, empty) = (&self.machine, Functional::zeros(self.size()));
         let (gaps, elements) = (0..machine.gaps.len(), 0..machine.friction.len());
-        let (free, fastest) = self.generator(key);
+        let (free, [fastest, rate]) = self.generator(key);
         let held: Vec<usize> = gaps.clone().filter(|&i| key.held[i]).collect();
         let sticking: Vec<usize> = elements.clone().filter(|&i| key.grips[i] == Grip::Stick).collect();
         let gap = |i: usize| &machine.gaps[i].row;
@@ -328,6 +354,7 @@ impl System {
         let h = f64::from((self.angle / fastest) as f32);
         Linear {
             step: (h, exponential(&(&a * h))),
+            radian: 1.0 / rate,
             acceleration,
             pressing: gaps.map(pressing).collect(),
             hold: elements.clone().map(hold).collect(),

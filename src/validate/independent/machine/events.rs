@@ -3,13 +3,17 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::system::{Constraints, Domain, Key, Numbers, PhasePoint, ROUNDING, Slide, affine, dot, size};
-use super::{Ending, Event, Flight, Gap, Mode, Slip, side_of, signed};
+use super::{Ending, Event, Flight, Gap, Mode, Series, Slip, side_of, signed};
 use rattlemap_dynamics::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use rattlemap_dynamics::motion::EventKind;
 use rattlemap_dynamics::word;
 
-/// A series of impacts ends if the height of a flight, in scales of length, is below this.
+/// Heights of flights, in scales of length, that are counted and followed in a series of impacts.
 const LOWEST_FLIGHT: f64 = 1e-13;
+const DEEPEST_FLIGHT: f64 = 1e-16;
+
+/// Duration of the rest of a series of impacts, in radians of the fastest rate, whose impacts are not counted.
+const SHORT_REST: f64 = 1.6e-4;
 
 /// A start that is nearer to a wall than this counts as on the wall. The distance is relative to the terms of the gap.
 const GAP_ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -48,6 +52,13 @@ struct Outcome {
     y: Numbers,
     /// Mode of a contact that lasts; none if the gap leaves the wall.
     lasting: Option<Lasting>,
+    /// Acceleration towards the wall without contact, and the time in which the fastest rate turns by one radian.
+    pressing: f64,
+    radian: f64,
+    /// The duration of the rest of a series of impacts, as a multiple of the leaving speed over the acceleration.
+    longer: f64,
+    /// Whether friction reverses only in some flights.
+    varies: bool,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -280,7 +291,7 @@ impl Flight {
     fn impact(&mut self, gap: usize, side: Side, wall: &Wall, t: f64) {
         let system = self.system.clone();
         let approach = side.sign() * self.rate(gap);
-        let [e, _] = wall.restitution.at(approach);
+        let [e, slope] = wall.restitution.at(approach);
         let mut kept = [false; MOST_GAPS];
         let outcome = loop {
             let kick = self.kick(gap, side, kept);
@@ -292,18 +303,35 @@ impl Flight {
                 let Mode::Stuck(own) = self.gaps[other].mode else { return false };
                 let presses = own.sign() * domain.tendency(&domain.unit(other), &point, 2).1 > 0.0;
                 let leaving = -own.sign() * outcome.y[system.n + other];
-                presses && leaving <= lowest_speed(&domain, other, &point)
+                presses && leaving <= limit(dot(&domain.accelerations[other], &point), LOWEST_FLIGHT)
             });
             match low {
                 Some(other) => kept[other] = true,
                 None => break outcome,
             }
         };
-        let kind = if outcome.lasting.is_some() { EventKind::MeshStart } else { EventKind::Impact };
+        let (leaving, before, lasts) = (e * approach, self.gaps[gap].series, outcome.lasting.is_some());
+        let is_slow = wall.mesh_speed < leaving && leaving <= limit(outcome.pressing, LOWEST_FLIGHT);
+        let later = outcome.longer * leaving / outcome.pressing;
+        let presses = !lasts && e < 1.0 && outcome.pressing > 0.0;
         self.y = outcome.y;
-        self.record(gap, kind, side, t);
-        // If contact begins with a speed above `mesh_speed`, it replaces an infinite series of impacts.
-        self.tally.series |= outcome.lasting.is_some() && e * approach > wall.mesh_speed;
+        if before != Series::Uncounted {
+            let begins = lasts || presses && (is_slow || before == Series::Short);
+            self.record(gap, if begins { EventKind::MeshStart } else { EventKind::Impact }, side, t);
+        }
+        if let Some(event) = self.events.iter_mut().rfind(|event| event.gap == gap)
+            && lasts
+            && before == Series::Uncounted
+        {
+            event.t = t + later;
+        }
+        let is_endless = slope == 0.0 && wall.mesh_speed == 0.0 && !outcome.varies;
+        let is_short = 2.0 * leaving < SHORT_REST * outcome.radian * (1.0 - e) * outcome.pressing;
+        self.gaps[gap].series = match before {
+            _ if !presses => Series::Long,
+            Series::Long if !is_slow => [Series::Long, Series::Short][usize::from(is_endless && is_short)],
+            _ => Series::Uncounted,
+        };
         match outcome.lasting {
             None => {}
             Some(Lasting::Rests) => self.gaps[gap].mode = Mode::Stuck(side),
@@ -333,15 +361,31 @@ impl Flight {
         let free = self.slide_after(key, kick, &bounced, None, t).unwrap_or(key);
         let domain = self.system.domain(free);
         let point = domain.point(&bounced, t);
+        let pressing = s * domain.tendency(&domain.unit(gap), &point, 2).1;
         let presses = |domain: &Domain| s * domain.tendency(&domain.unit(gap), &point, 2).1 > 0.0;
-        if e * approach <= wall.mesh_speed.max(lowest_speed(&domain, gap, &point)) {
+        let (back, varies) = self.reversed(free, &kick.change, &bounced, gap, t);
+        // At a reversal of friction, the height of a flight loses digits.
+        let deepest = if back == free { DEEPEST_FLIGHT } else { LOWEST_FLIGHT };
+        let comes_back = s * dot(&self.system.domain(back).accelerations[gap], &point);
+        let ratio = if back == free || varies { 1.0 } else { (comes_back / pressing).sqrt() };
+        let longer = (1.0 + 1.0 / ratio) / (1.0 - e * ratio);
+        let result = |key: Key, y: Numbers, lasting: Option<Lasting>| Outcome {
+            key,
+            y,
+            lasting,
+            pressing,
+            radian: domain.radian,
+            longer,
+            varies,
+        };
+        if e * approach <= wall.mesh_speed.max(limit(pressing, deepest)) {
             if wall.contact == Contact::Rigid {
                 let stopped = after(0.0);
                 key.held[gap] = Some(side);
                 if let Some(key) = self.slide_after(key, kick, &stopped, Some((gap, side)), t)
                     && key.held[gap].is_some()
                 {
-                    return Outcome { key, y: stopped, lasting: Some(Lasting::Rests) };
+                    return result(key, stopped, Some(Lasting::Rests));
                 }
             } else if presses(&domain) {
                 let mut meshing = free;
@@ -350,12 +394,12 @@ impl Flight {
                     let lasting = if e * approach > 0.0 { Lasting::Begins } else { Lasting::Presses };
                     // The rest of a series of impacts is one flight of the same duration and momentum.
                     let is_series = e * approach > wall.mesh_speed && e < 1.0;
-                    let y = if is_series { after(2.0 * e / (1.0 - e)) } else { bounced };
-                    return Outcome { key: meshing, y, lasting: Some(lasting) };
+                    let y = if is_series && longer.is_finite() { after(longer * e) } else { bounced };
+                    return result(meshing, y, Some(lasting));
                 }
             }
         }
-        Outcome { key: free, y: bounced, lasting: None }
+        result(free, bounced, None)
     }
 
     /// Chooses the modes of elements and gaps at rest after an impact, which may have `stopped` a gap.
@@ -382,6 +426,28 @@ impl Flight {
             at_rest.elements[i] = key.slides[i] == Slide::Sticks || self.slide_at(i, &point) == Slide::Sticks;
         }
         self.consistent(key, &at_rest, &point)
+    }
+
+    /// Returns the modes of friction in the second half of a flight, and whether some elements reverse only in some flights, while a gap with
+    /// this rate comes to rest in impacts.
+    fn reversed(&self, mut key: Key, kick: &DVector<f64>, y: &Numbers, gap: usize, t: f64) -> (Key, bool) {
+        let (n, rate, mut stopped, mut varies) = (self.system.n, y[self.system.n + gap], *y, false);
+        (0..n).for_each(|i| stopped[n + i] -= kick[i] * rate);
+        let point = self.domain().point(&stopped, t);
+        for (i, element) in self.system.elements.iter().enumerate() {
+            let (along, row) = (element.row.dot(kick).abs(), self.system.sliding_rate(i));
+            let slides = dot(&row, &point).abs();
+            if along <= ROUNDING * element.row.amax() * kick.amax() || slides > 2.0 * along * rate.abs() {
+                continue;
+            }
+            varies |= slides > ROUNDING * size(&row, &point);
+            key.slides[i] = match key.slides[i] {
+                Slide::Forwards => Slide::Backwards,
+                Slide::Backwards => Slide::Forwards,
+                Slide::Sticks => Slide::Sticks,
+            };
+        }
+        (key, varies)
     }
 
     /// Returns how an element slides at a point.
@@ -668,6 +734,9 @@ impl Flight {
     }
 
     fn record_slip(&mut self, i: usize, symbol: Option<u8>, t: f64) {
+        if self.gaps.iter().any(|gap| gap.series == Series::Uncounted) {
+            return;
+        }
         self.slips.push(Slip { t, element: i, symbol, after: self.events.len() });
         self.tally.symbols.extend(symbol);
         self.tally.phases.push((t / std::f64::consts::TAU).fract());
@@ -675,7 +744,7 @@ impl Flight {
     }
 }
 
-/// Returns the leaving speed below which a flight is not followed.
-fn lowest_speed(domain: &Domain, gap: usize, point: &PhasePoint) -> f64 {
-    (2.0 * LOWEST_FLIGHT * dot(&domain.accelerations[gap], point).abs()).sqrt()
+/// Returns the leaving speed of a flight of a height under an acceleration towards the wall.
+fn limit(pressing: f64, height: f64) -> f64 {
+    (2.0 * height * pressing.abs()).sqrt()
 }
