@@ -718,10 +718,11 @@ fn impact(gap: u32, side: u32) {
                 load_point(q);
                 is_slow = leaving <= max(mesh_speed, lowest_speed(domain, gap));
                 let back = reversed_slips(q, gap);
-                let returning = sign_of(side) * product(acceleration_row(domain_of(tried_gaps, back), gap), 0u);
-                ratio = sqrt(max(returning, Real(0.0)) / pressing);
-                // The rest of a series of impacts is short.
-                let is_short = 2.0 * approach < CLOSING_ANGLE * number(domain) * (1.0 - e) * pressing;
+                let outward = sign_of(side) * product(acceleration_row(domain, gap), 0u);
+                let inward = sign_of(side) * product(acceleration_row(domain_of(tried_gaps, back), gap), 0u);
+                ratio = sqrt(max(inward, Real(0.0)) / outward);
+                // The rest of a series of impacts is short after the impact before, whose leaving speed was `approach / ratio`.
+                let is_short = 2.0 * approach < ratio * CLOSING_ANGLE * number(domain) * (1.0 - e) * outward;
                 is_slow = is_slow || is_short && is_endless && !varies && ratio > 0.0;
                 if !is_slow || is_rigid || !(pressing > 0.0) {
                     break;

@@ -168,7 +168,8 @@ fn distance_from_quotients(model: &FileModel) -> f64 {
             let name = format!("acceleration_{i}");
             let [from, to] = [row - 1, row].map(|row| rows.number(row, &name));
             largest = largest.max(to.abs());
-            if is_smooth && time > 1e-6 * orbit.forcing_period {
+            // A shorter time may be the rest of a series of impacts.
+            if is_smooth && time > 3e-5 * orbit.forcing_period {
                 let change = rows.number(row, states[2 * i + 1]) - rows.number(row - 1, states[2 * i + 1]);
                 apart = apart.max((change / time - 0.5 * (from + to)).abs());
             }

@@ -1,16 +1,16 @@
 //! Changes of modes, state and tangents at events of a machine.
 
-use rattlemap_dynamics::model::{Contact, DryFriction, Side};
+use rattlemap_dynamics::model::{Contact, Side};
 
 use super::motion::{End, Event, Gap, Mode, Motion, Series, What, side_of, step_of};
 use super::system::{Functional, Grip, Linear, Matrix, ROUNDING, Vector};
 
-/// Height of flights, in scales of length, that are counted and followed.
+/// Height of flights, in scales of length, that are counted.
 const LOWEST_FLIGHT: f64 = 1e-13;
-const DEEPEST_FLIGHT: f64 = 1e-16;
 
-/// Duration of the rest of a series of impacts, in radians of the fastest rate, whose impacts are not counted.
+/// Durations of the rest of a series of impacts, in radians of the fastest rate, whose impacts are not counted, and not followed.
 const SHORT_REST: f64 = 1.6e-4;
+const DEEPEST_REST: f64 = 3e-8;
 
 /// After this number of simultaneous events, an impact shows that impacts of several gaps follow each other without end.
 const CROWD: usize = 4;
@@ -405,8 +405,8 @@ impl Motion<'_> {
             motion.decide();
         };
         let acceleration = |motion: &Self, gap: usize| motion.of(&motion.linear().acceleration[gap]).abs();
-        let limit = |motion: &Self, gap: usize, height: f64| {
-            (2.0 * height * system.length * acceleration(motion, gap)).sqrt()
+        let limit = |motion: &Self, gap: usize| {
+            (2.0 * LOWEST_FLIGHT * system.length * acceleration(motion, gap)).sqrt()
         };
         // The rest of a series of impacts is one flight of the same duration and momentum.
         let whole = if e * closing > wall.mesh_speed && e < 1.0 { 2.0 / (1.0 - e) } else { 1.0 };
@@ -418,8 +418,11 @@ impl Motion<'_> {
             later = 2.0 * e * closing / ((1.0 - e) * acceleration(self, i));
             reverses = self.reverses(&joint.change, s * e * closing);
             // At a reversal, the height of a flight loses digits.
-            let deepest = if reverses.is_none() { DEEPEST_FLIGHT } else { LOWEST_FLIGHT };
-            if e * closing <= wall.mesh_speed.max(limit(self, i, deepest)) {
+            let is_deep = match reverses.contains(&true) {
+                false => later <= DEEPEST_REST * self.linear().radian,
+                true => e * closing <= limit(self, i),
+            };
+            if e * closing <= wall.mesh_speed || is_deep {
                 if wall.contact == Contact::Rigid {
                     after(self, &joint, 0.0, Mode::Stuck(side));
                     lasts = matches!(self.gaps[i].mode, Mode::Stuck(_));
@@ -438,9 +441,10 @@ impl Motion<'_> {
             }
             // Gaps whose flight would be too low stay at rest; otherwise impacts of two gaps could alternate for ever.
             let linear = self.linear();
-            let low = joint.released.iter().find(|&&(j, own)| {
-                self.presses(&linear, j, own) && -self.rate(j, own) <= limit(self, j, LOWEST_FLIGHT)
-            });
+            let low = joint
+                .released
+                .iter()
+                .find(|&&(j, own)| self.presses(&linear, j, own) && -self.rate(j, own) <= limit(self, j));
             let Some(&(j, _)) = low else { break };
             self.corners += 1;
             keep.push(j);
@@ -451,10 +455,12 @@ impl Motion<'_> {
         } else if lasts {
             (e, slope) = (whole * e, whole * slope);
         }
-        let is_slow = wall.mesh_speed < e * closing && e * closing <= limit(self, i, LOWEST_FLIGHT);
+        let is_slow = wall.mesh_speed < e * closing && e * closing <= limit(self, i);
         let presses = !lasts && e < 1.0 && self.presses(&self.linear(), i, side);
         let before = start.gaps[i].series;
         let ends = before == Series::Short || is_slow;
+        // The limit under friction along the gap is tested elsewhere.
+        self.is_crowded |= reverses[0] && (presses && ends || lasts && whole > 1.0);
         if before != Series::Uncounted {
             let what = if lasts || presses && ends { What::Begins } else { What::Impact };
             self.record_as(i, what, side, symbol(&start.gaps[i], side));
@@ -469,11 +475,8 @@ impl Motion<'_> {
         self.gaps[i].series = match before {
             _ if !presses => Series::Long,
             Series::Long if !is_slow => {
-                let is_endless =
-                    slope == 0.0 && wall.mesh_speed == 0.0 && later < SHORT_REST * self.linear().radian;
-                // The limit under friction along the gap is tested elsewhere.
-                self.is_crowded |= is_endless && reverses == Some(0.0);
-                let is_short = is_endless && reverses.is_none();
+                let is_endless = slope == 0.0 && wall.mesh_speed == 0.0 && !reverses[1];
+                let is_short = is_endless && later < SHORT_REST * self.linear().radian;
                 if is_short { Series::Short } else { Series::Long }
             }
             _ => Series::Uncounted,
@@ -489,17 +492,18 @@ impl Motion<'_> {
         reset
     }
 
-    /// Returns the largest sliding rate of an element that would reverse while a gap with this rate comes to rest in impacts; none if all
-    /// slide on.
-    fn reverses(&self, kick: &Vector, rate: f64) -> Option<f64> {
-        let n = self.system.degrees;
-        let velocities = self.y.rows(n, n) + kick * rate;
-        let slides = |friction: &DryFriction| {
+    /// Whether an element reverses while a gap with this rate comes to rest in impacts: in each flight, or in some.
+    fn reverses(&self, kick: &Vector, rate: f64) -> [bool; 2] {
+        let velocities = self.y.rows(self.system.degrees, self.system.degrees) + kick * rate;
+        let mut reverses = [false; 2];
+        for friction in &self.system.machine.friction {
             let (along, size) = (friction.row.dot(kick).abs(), friction.row.norm() * kick.norm());
             let slides = (friction.row.dot(&velocities) - friction.speed).abs();
-            (along > ROUNDING * size && slides <= 2.0 * along * rate.abs()).then_some(slides)
-        };
-        self.system.machine.friction.iter().filter_map(slides).reduce(f64::max)
+            if along > ROUNDING * size && slides <= 2.0 * along * rate.abs() {
+                reverses[usize::from(slides > SMALL * size)] = true;
+            }
+        }
+        reverses
     }
 
     /// Begins to slide after an impact that has changed the rate of a gap. Gaps that friction holds on a wall may move.

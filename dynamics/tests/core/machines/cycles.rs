@@ -101,7 +101,7 @@ fn compare(case: &Case, form: Form) -> Result<Agreement, String> {
 
 /// Whether mean rates of coordinates that drift differ.
 fn drifts_apart(cycle: &Cycle, orbit: &Orbit, machine: &Oscillator) -> bool {
-    let Some(quantities) = &orbit.quantities else { return !orbit.floquet.is_none() };
+    let Some(quantities) = &orbit.quantities else { return orbit.floquet.is_some() };
     let size = orbit.strobe.iter().fold(machine.length_scale() * machine.omega, |size, x| size.max(x.abs()));
     cycle.drift.iter().enumerate().any(|(i, drift)| {
         let theirs = quantities.displacements[place_of_displacement(i)].drift.unwrap_or(0.0);

@@ -246,9 +246,7 @@ pub(crate) fn case_of(structure: Structure, seed: u64, shape: Shape) -> Case {
     let mut rows: Vec<Vector> = Vec::new();
     while rows.len() < shape.gaps {
         rows.push(projected(&row(random, n)));
-        if rows[rows.len() - 1].norm() < 0.2 {
-            rows.pop();
-        } else if !are_independent(&rows) {
+        if rows[rows.len() - 1].norm() < 0.2 || !are_independent(&rows) {
             rows.pop();
         }
     }
@@ -364,7 +362,8 @@ pub(crate) fn any_case(seed: u64) -> Case {
 /// Returns the machine of a seed: in turn one that drifts, a symmetric one, and any.
 pub(crate) fn structured_case(seed: u64) -> Case {
     let shape = STRUCTURED[(seed / 3 % STRUCTURED.len() as u64) as usize];
-    let structures = [Structure::Drifting { is_damped: seed % 2 == 0 }, Structure::Symmetric, Structure::Any];
+    let structures =
+        [Structure::Drifting { is_damped: seed.is_multiple_of(2) }, Structure::Symmetric, Structure::Any];
     case_of(structures[(seed % 3) as usize], seed, shape)
 }
 

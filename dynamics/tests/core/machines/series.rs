@@ -624,7 +624,7 @@ fn check(seeds: std::ops::Range<u64>, least: usize) {
 #[test]
 #[ignore = "takes minutes; scripts/test.sh --all"]
 fn four_hundred_cycles_with_series_agree_with_their_limit() {
-    check(0..1_000, 400);
+    check(0..720, 400);
 }
 
 #[test]
