@@ -16,7 +16,17 @@ fn is_chaos() -> bool {
     if tally.period < search.counting_start + LEAST_COUNTED && tally.period < settings.periods {
         return false;
     }
+    if tally.period < settings.periods && nears_rest() {
+        return false;
+    }
     return is_chaotic(select(Real(settings.chaos_errors), CHAOS_ERRORS, tally.period >= settings.periods));
+}
+
+// Whether the motion may soon rest on a wall and forget its past, which ends chaos: in a rare period it has a long series of impacts.
+fn nears_rest() -> bool {
+    let most = Real(search.most_events);
+    let is_series = most >= LEAST_SERIES && most * Real(tally.period) > RARE_SERIES * Real(search.all_events);
+    return is_series && tally.impacts > 0u && shapes[cell.flow_index].degrees == 1u;
 }
 
 fn is_chaotic(errors: Real) -> bool {

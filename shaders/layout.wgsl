@@ -192,8 +192,9 @@ struct Search {
     // Number of strobes of the motion so far, and number of its latest cycles with the same events as the cycle that is read.
     strobe_count: u32,
     matching_cycles: u32,
-    // Number of events in all whole periods.
+    // Number of events in all whole periods, and largest number in one period after half of `exponent_from`.
     all_events: u32,
+    most_events: u32,
     // 1 once only the periods that confirm chaos are left.
     confirms_chaos: u32,
     // Strobe after which the windows of the averages begin, and the length of each window; a length of 0 if they have not begun.

@@ -8,6 +8,9 @@ fn begin_period() {
     tally.period += 1u;
     tally.passes_in_period = 0u;
     search.all_events += tally.events_in_period;
+    if 2u * tally.period > settings.exponent_from {
+        search.most_events = max(search.most_events, tally.events_in_period);
+    }
     tally.events_in_period = 0u;
     if search.all_events > settings.most_events {
         tally.status = STATUS_CAP_EVENTS;

@@ -30,7 +30,7 @@ pub use analysis::{
 };
 pub use approach::{BRANCH_CYCLES, LINEAR_TOLERANCE};
 pub use budget::Budget;
-pub use cell::{Measurement, measure, measure_at_section, measure_until};
+pub use cell::{LEAST_SERIES, Measurement, RARE_SERIES, measure, measure_at_section, measure_until};
 pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;

@@ -14,7 +14,7 @@ const SCENE: &str = include_str!("../../scenes/gallery/impact_oscillator.toml");
 const PERIODS: u32 = 1000;
 
 fn plan(further: u32) -> Plan {
-    let sets = ["axis.0.count=24", "axis.1.count=24", &format!("integration.confirm_chaos={further}")];
+    let sets = ["axis.0.count=28", "axis.1.count=28", &format!("integration.confirm_chaos={further}")];
     Plan::new(&Scene::parse(SCENE, "s", &sets.map(str::to_owned), Purpose::Map).unwrap())
 }
 

@@ -22,6 +22,8 @@ pub const FRESH_TANGENT: State =
 #[derive(Clone, Debug, Default)]
 pub struct Exponent {
     growth: Vec<f64>,
+    /// Whether the vector vanished in the last period.
+    vanished: bool,
 }
 
 impl Exponent {
@@ -34,6 +36,7 @@ impl Exponent {
         let len = trajectory.flow().state_len();
         let length = u[..len].iter().map(|x| x * x).sum::<f64>().sqrt();
         self.growth.push(length.max(f64::MIN_POSITIVE).ln() + trajectory.log_scale());
+        self.vanished = length == 0.0;
         trajectory.set_tangents(tangents.map(|mut u| {
             if length > 0.0 {
                 u[..len].iter_mut().for_each(|x| *x /= length);
@@ -42,6 +45,11 @@ impl Exponent {
                 FRESH_TANGENT
             }
         }));
+    }
+
+    /// Whether the vector vanished in the last recorded period: the motion came to rest and forgot its past.
+    pub(crate) fn vanished(&self) -> bool {
+        self.vanished
     }
 
     /// Returns the logarithm of the growth over the last `periods`, or none if fewer were recorded.
