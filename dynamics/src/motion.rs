@@ -31,6 +31,14 @@ pub use trajectory::Trajectory;
 /// from the wall. The saltation matrix is proportional to the inverse of the approach speed.
 pub const GRAZING_SPEED: f64 = 4e-5;
 
+/// Longest duration of a series of impacts that is replaced by its limit, in radians of the fastest rate of free motion. The error is of
+/// third order in the duration.
+pub const CLOSING_ANGLE: f64 = 1e-4 * 1.6;
+
+/// Mesh speeds below this, relative to the scale of length times the rate of free motion, count as zero: in f64, a series of impacts does
+/// not reach them.
+pub const NO_THRESHOLD: f64 = 1e-10;
+
 /// Speeds below this at an event, relative to the scale of length times the rate of free motion, make the linearisation meaningless.
 pub const NO_SPEED: f64 = 1e-14;
 

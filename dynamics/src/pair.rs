@@ -24,7 +24,6 @@ mod step_verdict;
 mod sticking;
 mod tangent;
 
-pub use chatter::{CLOSING_ANGLE, NO_THRESHOLD};
 pub(crate) use flow::Schedule;
 pub use flow::{DomainKind, Gap, LinearFlow, PairFlow, Phasor};
 use flow::{Expansion, Step};

@@ -49,7 +49,7 @@ fn close_chatter(side: u32, u: Real) {
         // A neighbouring motion leaves the wall at another time, with another speed and pressing acceleration. Its sequence ends later by
         // `late_by`.
         let per_speed = (1.0 - 2.0 * (change / (3.0 * pressing) + damping * (1.0 / 6.0)) * whole) * whole / u;
-        let per_pressing = whole / pressing;
+        let per_pressing = (1.0 - (change / pressing + damping * (1.0 / 3.0)) * whole) * whole / pressing;
         crossing.lasts = lasts;
         // If the gap sticks at the end, it also sticks in all neighbouring motions.
         crossing.pressing = select(sign * (pressing + lasts * change), Real(0.0), is_rigid(side));

@@ -2,13 +2,12 @@
 
 use super::precision::Precision;
 use rattlemap_dynamics::machine::LOWEST_FLIGHT;
-use rattlemap_dynamics::motion::{GRAZING_SPEED, NO_SPEED};
+use rattlemap_dynamics::motion::{CLOSING_ANGLE, GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 use rattlemap_dynamics::orbit::{
     BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_SERIES,
     LEAST_WINDOW, LINEAR_TOLERANCE, NEAR_STROBE_TURNS, NEUTRAL_ORDER, ON_STROBE_TURNS, PLAIN_GROWTH,
     RARE_SERIES, ROUNDING_OF_AVERAGES, SHARED_GROWTH,
 };
-use rattlemap_dynamics::pair::{CLOSING_ANGLE, NO_THRESHOLD};
 use rattlemap_dynamics::stability::CORRELATION_MARGIN;
 
 /// Largest meshing speed at which lanes follow chatter by short flights, relative to half the walls' distance times

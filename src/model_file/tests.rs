@@ -54,9 +54,8 @@ mass = [["m", "0.5"], ["0.5", "1"]]
 damping = [["c", "-c"], ["-c", "c + d"]]
 stiffness = [["k", "-k"], ["-k", "k+1"]]
 frequency = "1.5"
-force = [0, 0]
 gap = ["1", "-2"]
-
+force = [0, 0]
 [[contact]]
 side = "left"
 at = "-d"
@@ -567,7 +566,7 @@ fn equal_stages_have_the_domains_of_a_model_without_stages() {
         let quoted = format!("\"{name}\"");
         format!("{head}[motion]{}", rest.replace(&quoted, &format!("[{quoted}, {quoted}]")))
     });
-    let without = read(&plain.replace("stages = [0, \"eps - 1\"]", ""));
+    let without = read(&plain.replace("stages = [0, \"eps - 1\"]", "force = [0, 0]"));
     let with = read(&lists);
     let (a, b) = (pair(&without), pair(&with));
     assert!(lists.contains(r#"["k1", "k1"]"#) && a.stages.is_empty() && a.schedule.is_empty());

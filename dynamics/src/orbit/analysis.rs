@@ -25,9 +25,12 @@ pub(super) const GROWTH_ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Standard errors by which an exponent must exceed zero for chaos.
 pub const CHAOS_ERRORS: f64 = 3.0;
 
-/// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length: with the
-/// default transient 8,764 periods in all.
-pub const LONGEST_WINDOW: u32 = 4096;
+/// Default number of forcing periods in the longest window. An undecided motion is observed in windows that double in length.
+pub const LONGEST_WINDOW: u32 = 32_768;
+
+/// Forcing periods of the window after which, by default, only a motion is observed further whose exponent may be positive. With the default
+/// transient, other undecided motion ends after 8,764 periods.
+const LAST_WINDOW: u32 = 4096;
 
 /// Growth of a tangent vector, as a logarithm, that no escape from an unstable cycle reaches: it exceeds the ratio of the size of the
 /// motion to rounding errors.
@@ -81,7 +84,7 @@ const APPROACH_CYCLE_CAP: f64 = 4000.0;
 /// The motion is `periodic` if a stable cycle of at most `max_period` forcing periods is confirmed. It is `chaotic`
 /// if the exponent exceeds zero by three standard errors and nearby motions have separated by a factor of `e^40` or
 /// more. It is `quasi-periodic` if the exponent is zero within its error and the section is regular. If none of these
-/// holds after the observed periods, windows of twice the length follow, up to 4,096 periods; after that it is undecided.
+/// holds after the observed periods, windows of twice the length follow, up to 4,096 periods, or 32,768 if the exponent may be positive; after that it is undecided.
 ///
 /// # Errors
 /// [`ModelError`] if the model is not valid.
@@ -302,10 +305,12 @@ impl Analysis<'_> {
             if self.flow.rigid_modes.accelerates {
                 return self.aperiodic(trajectory, &window, Class::Undecided, Status::Accelerates);
             }
+            let is_enough = last == LONGEST_WINDOW && length >= LAST_WINDOW && !self.may_be_chaotic(&window);
+            let is_last = length >= last || is_enough;
             let free =
                 if self.flow.timing == Timing::Free { self.free_orbit(&trajectory, length) } else { None };
             let approaches = free.as_ref().is_some_and(|free| free.approaches);
-            if let Some(free) = free.filter(|free| free.is_reached(length >= last)) {
+            if let Some(free) = free.filter(|free| free.is_reached(is_last)) {
                 return Ok(free.orbit);
             }
             let found = candidates(&window.strobes, &window.metric, self.settings.max_period);
@@ -320,7 +325,7 @@ impl Analysis<'_> {
             if !approaches && self.is_quasi_periodic(&window) {
                 return self.aperiodic(trajectory, &window, Class::QuasiPeriodic, Status::Ok);
             }
-            if length >= last || cost * trajectory.work().steps as f64 > EXTENSION_STEPS {
+            if is_last || cost * trajectory.work().steps as f64 > EXTENSION_STEPS {
                 let status = self.undecided_status(&trajectory, &window.metric, &found);
                 return self.aperiodic(trajectory, &window, Class::Undecided, status);
             }
@@ -374,6 +379,13 @@ impl Analysis<'_> {
         }
         let least = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;
         least * window.strobes.len() as f64 * self.flow.period > ESCAPE_GROWTH
+    }
+
+    /// Whether further periods may show chaos: the exponent is more than its error, and tangents grow faster than in neutral motion.
+    fn may_be_chaotic(&self, window: &Window) -> bool {
+        let count = window.strobes.len() as f64;
+        window.lyapunov > window.lyapunov_error
+            && window.lyapunov * count * self.flow.period > neutral_growth(TANGENT_PERIODS, count)
     }
 
     /// Integrates `length` periods and computes strobe states, exponent and averages.

@@ -2,19 +2,14 @@
 
 use super::PairMotion;
 use crate::model::{Contact, Side};
-use crate::motion::{EventKind, Observer};
+use crate::motion::{CLOSING_ANGLE, EventKind, NO_THRESHOLD, Observer};
 use crate::pair::flow::{DomainKind, Gap, LinearFlow, PairFunctional, Phasor, RADIUS};
 
 /// Longest duration of a series that is replaced by its closed form, in Taylor steps of free motion. The error of the
 /// closed form is of third order in the duration.
 const CLOSING_DURATION: f64 = 1e-4;
 
-/// The closing duration as an angle, in radians of the fastest rate of free motion.
-pub const CLOSING_ANGLE: f64 = CLOSING_DURATION * RADIUS;
-
-/// Mesh speeds below this, relative to the scale of length times the rate of free motion, count as zero: in f64, a series of impacts does
-/// not reach them.
-pub const NO_THRESHOLD: f64 = 1e-10;
+const _: () = assert!(CLOSING_ANGLE == CLOSING_DURATION * RADIUS);
 
 /// Motion with the gap closed, while the wall cancels the relative acceleration.
 struct ClosedGap {

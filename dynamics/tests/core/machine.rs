@@ -204,7 +204,7 @@ fn bar(inertia: f64) -> Oscillator {
         mass: DMatrix::from_diagonal(&vector(&[1.0, inertia])),
         stages: vec![Forces { damping: none.clone(), stiffness: none, load: vector(&[-9.81, 0.0]) }],
         schedule: Vec::new(),
-        drives: vec![Drive { order: 1, cos: vector(&[15.0, 0.0]), sin: vector(&[0.0, 0.0]) }],
+        drives: vec![Drive { order: 1, cos: vector(&[2.0, 0.0]), sin: vector(&[0.0, 0.0]) }],
         gaps: [-1.0, 1.0].map(end).into(),
         friction: Vec::new(),
         signals: Vec::new(),

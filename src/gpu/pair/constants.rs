@@ -8,7 +8,7 @@ use super::pushing::{closed_pages, open_page, push};
 use crate::gpu::layout::{Domain, Flow};
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{self, Contact, Pair, Side};
-use rattlemap_dynamics::pair::CLOSING_ANGLE;
+use rattlemap_dynamics::motion::CLOSING_ANGLE;
 
 /// Largest angle, in radians, by which the fastest mode turns in one step. The shaders' Taylor series and bounds are
 /// designed for it.

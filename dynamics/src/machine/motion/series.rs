@@ -8,8 +8,7 @@ use crate::machine::impact::Impact;
 use crate::machine::modes::{AtRest, GapMode, Modes};
 use crate::machine::{Numbers, PhasePoint, ROUNDING};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Restitution, Side};
-use crate::motion::{EventKind, Observer, Slip, SlipKind, Slips};
-use crate::pair::{CLOSING_ANGLE, NO_THRESHOLD};
+use crate::motion::{CLOSING_ANGLE, EventKind, NO_THRESHOLD, Observer, Slip, SlipKind, Slips};
 
 /// Largest number of flights that are added one by one.
 const MOST_FLIGHTS: usize = 1024;
