@@ -184,9 +184,20 @@ fn follow(mut motion: Strobed<'_>, budget: &Budget) -> Option<Record> {
             return None;
         }
         Some(lag) => cycle(&motion, lag as u32, units)?,
+        // Where nothing bounds a motion, its neighbours separate without chaos.
+        None if grows(&strobes) => return None,
         None => chaos(motion, budget.settings.observed_periods, units)?,
     };
     Some(Record { periods_run: budget.periods(), ..record })
+}
+
+/// Whether a motion grows without bound: its displacements become larger in each quarter of the strobes, and a hundred times in all.
+fn grows(strobes: &[Vec<f64>]) -> bool {
+    let largest = |part: &[Vec<f64>]| {
+        part.iter().flat_map(|q| q.iter().step_by(2)).fold(0.0f64, |most, x| most.max(x.abs()))
+    };
+    let sizes: Vec<f64> = strobes.chunks(strobes.len().div_ceil(4).max(1)).map(largest).collect();
+    sizes.is_sorted() && sizes.last().zip(sizes.first()).is_some_and(|(last, first)| *last > 100.0 * first)
 }
 
 /// Returns the motion displaced along a coordinate. None if elements or gaps at rest allow no displacement.
