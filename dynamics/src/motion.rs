@@ -22,7 +22,7 @@ pub use event::{
 };
 pub use flow::{Engine, Flow};
 pub use slip::{Slip, Slips};
-pub(crate) use sums::{Contacts, Drift, GapSums, Moments, nodes, root, share};
+pub(crate) use sums::{Contacts, GapSums, Moments, nodes, root, share};
 pub use sums::{DISPLACEMENTS, Sums, place_of_displacement, place_of_gap, place_of_signal};
 pub(crate) use trajectory::Flights;
 pub use trajectory::Trajectory;

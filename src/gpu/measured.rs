@@ -57,6 +57,7 @@ fn displacement(
         amplitude,
         mean: (a * z + b * x) / steps,
         drift: None,
+        drift_error: None,
         rms: (square / steps).sqrt(),
         harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
     }

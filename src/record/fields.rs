@@ -1,7 +1,7 @@
 //! The fields of a record as rows of numbers, for files and messages.
 
 use super::Record;
-use super::measures::{FURTHER, GROUPS, MEASURES, OF_GAPS, OF_SIGNALS, places_before};
+use super::measures::{FURTHER, GROUPS, MEASURES, OF_DRIFTS, OF_GAPS, OF_SIGNALS, places_before};
 use rattlemap_dynamics::model::STATE;
 
 /// A field of a record, or the measured quantities of a group.
@@ -105,24 +105,24 @@ pub const STROBE: usize = 4;
 const GROUP_FIELDS: usize = 12;
 
 /// Place of the time of a cycle in the last field.
-const LAST: usize = 1 + MEASURES - OF_SIGNALS;
+const CYCLE_TIME: usize = 1 + OF_DRIFTS + (MEASURES - OF_DRIFTS) / 2 - OF_SIGNALS;
 
 /// All fields in the order of files. The last but two has the measured quantities of displacements and gaps that oscillators of at most
 /// two coordinates with one gap do not have, the next one those of each of several gaps. The last one has the only number of the last
-/// group but one, those of signals, drifts, and the time of a cycle.
+/// group but one, those of signals, drifts, the time of a cycle, and the errors of drifts.
 pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
     let further = field!("further_displacements", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
     let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUP_FIELDS + 3];
     let mut i = fields.len() - 1;
     // Not a block, which would be a copy of the number.
     fields[i] = field!(
-        "release_energy_signals_drifts_and_cycle_time",
+        "release_energy_signals_drifts_cycle_time_and_errors_of_drifts",
         2 + MEASURES - OF_SIGNALS,
         8,
         |record, nth| record.measures[match nth {
             0 => places_before(GROUP_FIELDS),
-            LAST => places_before(GROUP_FIELDS + 1),
-            nth => OF_SIGNALS + nth - 1,
+            CYCLE_TIME => places_before(GROUP_FIELDS + 1),
+            nth => OF_SIGNALS + nth - if nth < CYCLE_TIME { 1 } else { 2 },
         }]
     );
     i -= 1;
@@ -143,7 +143,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
 
 impl Record {
     /// Number of bytes in messages to and from pages.
-    pub const BYTES: usize = 1184;
+    pub const BYTES: usize = 1280;
 
     /// Returns the bytes of all fields, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {

@@ -8,7 +8,7 @@ use rattlemap_dynamics::orbit::{
 };
 
 /// Number of numbers in [`Record::measures`].
-pub const MEASURES: usize = OF_DRIFTS + MOST_COORDINATES + MOST_SIGNALS;
+pub const MEASURES: usize = OF_DRIFTS + DRIFTS.len() * (MOST_COORDINATES + MOST_SIGNALS);
 
 /// First of the numbers of further displacements and gaps in [`Record::measures`].
 pub(crate) const FURTHER: usize = places_before(GROUPS.len());
@@ -19,12 +19,16 @@ pub(crate) const OF_GAPS: usize = FURTHER + FURTHER_DISPLACEMENTS * numbers_befo
 /// First of the numbers of each signal in [`Record::measures`].
 pub(crate) const OF_SIGNALS: usize = OF_GAPS + MOST_GAPS * GAP_GROUPS.len();
 
-/// First of the drifts of displacements and signals in [`Record::measures`].
+/// First of the drifts of displacements and signals in [`Record::measures`]; their errors follow.
 pub(crate) const OF_DRIFTS: usize = OF_SIGNALS + MOST_SIGNALS * numbers_before(GROUPS.len());
 
-/// The mean rate of a displacement or a signal that a rigid-body mode shifts. It is requested with the amplitude.
-static DRIFT: Number =
-    number("drift", "drift of {}", Dimension::Speed, |of, i| of.quantities?.displacements[i].drift);
+/// The mean rate of a displacement or a signal that a rigid-body mode shifts, and its standard error. They are requested with the amplitude.
+static DRIFTS: [Number; 2] = [
+    number("drift", "drift of {}", Dimension::Speed, |of, i| of.quantities?.displacements[i].drift),
+    number("drift_error", "standard error of the drift of {}", Dimension::Speed, |of, i| {
+        of.quantities?.displacements[i].drift_error
+    }),
+];
 
 /// Numbers of each gap of a model with several gaps. They have the validity bits of the quantities for all gaps together, and are NaN if
 /// a gap does not have the number.
@@ -245,13 +249,13 @@ impl Group {
             distances.fold(0.0, farther)
         };
         let own = measures.chunks(self.numbers.len()).map(of_subject).fold(0.0, farther);
-        // A drift is a rate, so it is compared with the largest drift alone.
+        // A drift is a rate, so it is compared with the largest drift alone. Its error is not compared.
         let added = share * largest(&drifts);
         let of_drift = |measure: &Measure| {
             let [a, b] = [a, b].map(|record| record.measures[measure.place].abs());
             relative(apart(a, b), b + added)
         };
-        drifts.iter().map(of_drift).fold(own, farther)
+        drifts.iter().filter(|measure| measure.is_odd()).map(of_drift).fold(own, farther)
     }
 
     /// Returns the numbers of the group.
@@ -307,11 +311,12 @@ fn of_drifts() -> impl Iterator<Item = Measure> {
     let group = Group::named("amplitude").expect("a group has this name");
     let displacements = (0..MOST_COORDINATES).map(Subject::Displacement);
     let subjects = displacements.chain((0..MOST_SIGNALS).map(Subject::Signal));
-    (OF_DRIFTS..).zip(subjects).map(move |(place, subject)| Measure {
+    let of_number = move |number| subjects.clone().map(move |subject| (number, subject));
+    (OF_DRIFTS..).zip(DRIFTS.iter().flat_map(of_number)).map(move |(place, (number, subject))| Measure {
         place,
         group,
         subject: Some(subject),
-        number: &DRIFT,
+        number,
     })
 }
 
@@ -363,7 +368,7 @@ impl Measure {
     /// Whether a motion with these names has the number.
     pub fn is_of(&self, names: &Subjects) -> bool {
         let drifts = self.subject.is_some_and(|subject| names.drifts.contains(&subject.place()));
-        let is_there = if self.is_odd() { self.is_drift() == drifts } else { true };
+        let is_there = if self.is_drift() { drifts } else { !(self.is_odd() && drifts) };
         is_there && self.subject(names).is_some()
     }
 
@@ -427,9 +432,9 @@ impl Measure {
         self.number.dimension
     }
 
-    /// Whether it is the drift of a displacement or a signal.
+    /// Whether it is the drift of a displacement or a signal, or its error.
     fn is_drift(&self) -> bool {
-        self.number.name == DRIFT.name
+        DRIFTS.iter().any(|number| number.name == self.number.name)
     }
 
     /// Whether the mirror image of a motion has the opposite value.
@@ -446,8 +451,8 @@ impl Measure {
     pub fn of(&self, record: &Record) -> Option<f64> {
         let bits = self.group.bit | if self.is_of_one_gap() { valid::GAPS } else { 0 };
         let value = (record.valid & bits == bits).then(|| record.measures[self.place]);
-        // A gap may not have the number, and that of a signal may be too large.
-        value.filter(|value| !value.is_nan())
+        // A gap may not have the number, that of a signal may be too large, and the drift of a cycle has no error.
+        value.filter(|value| !(value.is_nan() || *value == 0.0 && self.number.name == DRIFTS[1].name))
     }
 
     /// Returns the number of a motion.

@@ -164,7 +164,7 @@ fn of_measure(measure: Measure, quantity: Quantity, names: &Subjects) -> Option<
         name: measure.name(names),
         title: measure.title(subject),
         label: measure.title(&symbol(subject)),
-        subject: [measure.part(), subject].join(" ").trim().to_owned(),
+        subject: [&measure.part().replace('_', " "), subject].join(" ").trim().to_owned(),
         dimension: measure.dimension(),
         unit: None,
         quantity,

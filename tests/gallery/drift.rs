@@ -127,7 +127,7 @@ fn a_capsule_moves_on_and_has_a_cycle() {
         .collect();
     assert_eq!(
         names_of_amplitude.join(" "),
-        "amplitude_x1 amplitude_x2 amplitude_gap mean_gap drift_x1 drift_x2"
+        "amplitude_x1 amplitude_x2 amplitude_gap mean_gap drift_x1 drift_x2 drift_error_x1 drift_error_x2"
     );
 }
 
@@ -205,4 +205,33 @@ fn maps_that_drift_are_judged() {
         judged += (0..records.len()).filter_map(of).count();
     }
     assert!(judged >= 9, "{judged} of 18 cells have a period for the judge");
+}
+
+#[test]
+fn the_drift_of_chaos_has_its_standard_error() {
+    let mut errors = Vec::new();
+    let mut capsule = model(CAPSULE);
+    for (name, value) in [("beta", 100.0), ("d", 0.1)] {
+        capsule.set(name, value).unwrap();
+    }
+    for (omega, a) in (0..12).flat_map(|i| [1.8, 2.5].map(|a| (1.12 + 0.01 * f64::from(i), a))) {
+        capsule.set("omega", omega).unwrap();
+        capsule.set("a", a).unwrap();
+        let found = orbit(&capsule, REST);
+        let of = displacement(&found, 0);
+        if found.class != Class::Chaotic {
+            assert_eq!(of.drift_error, None, "{omega} {a}: {found:?}");
+            continue;
+        }
+        let flow = Flow::of(&capsule).unwrap();
+        let mut motion = Trajectory::<0>::new(&flow, capsule.law(), found.strobe);
+        let start = motion.unshifted_state()[0];
+        (0..4000).for_each(|_| motion.advance_period(&mut ()).unwrap());
+        let long = (motion.unshifted_state()[0] - start) / (4000.0 * flow.period);
+        errors.push((of.drift.unwrap() - long) / of.drift_error.unwrap());
+    }
+    assert!(errors.len() >= 12, "{errors:?}");
+    assert!(errors.iter().all(|error| error.abs() < 4.0), "{errors:?}");
+    let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64;
+    assert!((0.3..2.5).contains(&mean_square), "{mean_square}: {errors:?}");
 }

@@ -1,6 +1,5 @@
 //! An oscillator, prepared for its motions.
 
-use super::Drift;
 use crate::machine::System;
 use crate::model::{
     Contact, Form, Law, Model, ModelError, NonImpacting, Oscillator, Pair, RigidMode, RigidModes, Signal,
@@ -185,10 +184,10 @@ impl Flow {
         }
     }
 
-    /// Returns the drift of a displacement, a gap or a signal, by its place, if a rigid-body mode shifts it.
-    pub(crate) fn drift(&self, place: usize, drifts: &[Drift]) -> Option<f64> {
+    /// Returns the drift of a displacement, a gap or a signal, by its place, if a rigid-body mode shifts it. `rates`: those along the modes.
+    pub(crate) fn drift(&self, place: usize, rates: &[f64]) -> Option<f64> {
         let along = |mode: &RigidMode| mode.along(place, self.signals());
-        let rates = self.rigid_modes.modes.iter().zip(drifts).map(|(mode, drift)| along(mode) * drift.rate);
+        let rates = self.rigid_modes.modes.iter().zip(rates).map(|(mode, rate)| along(mode) * rate);
         self.rigid_modes.modes.iter().any(|mode| along(mode) != 0.0).then(|| rates.sum())
     }
 

@@ -724,7 +724,8 @@ impl Analysis<'_> {
     /// Measures the observed periods that follow a trajectory; none if they are not requested or it cannot be
     /// continued.
     pub(super) fn quantities(&self, trajectory: &Trajectory<'_>) -> Option<Quantities> {
-        let measure = || Meter::measure(&mut trajectory.clone(), self.settings.observed_periods.max(1));
+        let periods = self.settings.observed_periods.max(1);
+        let measure = || Meter::measure_aperiodic(&mut trajectory.clone(), periods);
         self.measures.then(measure)?.ok()
     }
 

@@ -2,11 +2,12 @@
 //!
 //! A [`Meter`] receives the events of a trajectory, whose engine measures the flights between them.
 
-use crate::model::{Law, MOST_GAPS, NonImpacting, State};
+use crate::model::{Law, MOST_COORDINATES, MOST_GAPS, NonImpacting, State};
 use crate::motion::{
     Allowance, Contacts, DISPLACEMENTS, EventKind, Flights, Flow, GapEvent, GapSums, Moments, Observer,
     States, Stop, Sums, Trajectory, share,
 };
+use crate::stability::standard_error;
 
 /// Quantities of one motion over a whole number of forcing periods, in the units of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,6 +97,8 @@ pub struct Displacement {
     /// Mean rate, if a [rigid-body mode](crate::model::RigidMode) shifts the displacement. All other numbers are then those of the
     /// displacement without drift and mean.
     pub drift: Option<f64>,
+    /// [Standard error](crate::stability::standard_error) of the drift of aperiodic motion.
+    pub drift_error: Option<f64>,
     /// Root mean square.
     pub rms: f64,
     /// Amplitude `a > 0` and phase `phi` in `(-pi, pi]` of the component `a cos(omega t + phi)`.
@@ -113,6 +116,7 @@ impl Displacement {
             amplitude: 0.5 * (moments.high - moments.low),
             mean: moments.value / time,
             drift: None,
+            drift_error: None,
             rms: (moments.square / time).sqrt(),
             harmonic: [cos.hypot(sin), (-sin).atan2(cos)],
         }
@@ -162,10 +166,8 @@ impl<'f> Meter<'f> {
         if !flow.rigid_modes.modes.is_empty() {
             let mut ahead = trajectory.clone();
             (0..periods).try_for_each(|_| ahead.advance_period(&mut ()))?;
-            let (time, from) = (f64::from(periods) * flow.period, trajectory.travelled());
-            for (nth, drift) in sums.drifts.iter_mut().enumerate() {
-                drift.rate = (ahead.travelled()[nth] - from[nth]) / time;
-            }
+            let rates = drift_rates(flow, [trajectory, &ahead], periods);
+            sums.drifts.iter_mut().zip(rates).for_each(|(drift, rate)| drift.rate = rate);
         }
         Ok(Meter { flow, first_period: trajectory.period(), flights: trajectory.flights(), sums })
     }
@@ -180,6 +182,32 @@ impl<'f> Meter<'f> {
             trajectory.advance_period(&mut meter)?;
         }
         Ok(meter.finish(trajectory.period()))
+    }
+
+    /// As [`Meter::measure`], for aperiodic motion, whose drift has a standard error.
+    ///
+    /// # Errors
+    /// As for [`Meter::measure`].
+    pub(super) fn measure_aperiodic(
+        trajectory: &mut Trajectory<'f>,
+        periods: u32,
+    ) -> Result<Quantities, Stop> {
+        let (flow, mut before) = (trajectory.flow(), trajectory.clone());
+        let mut quantities = Meter::measure(trajectory, periods)?;
+        if !flow.rigid_modes.modes.is_empty() {
+            let mut of_periods = Vec::new();
+            for _ in 0..periods {
+                let from = before.clone();
+                before.advance_period(&mut ())?;
+                of_periods.push(drift_rates(flow, [&from, &before], 1));
+            }
+            for (place, displacement) in quantities.displacements.iter_mut().enumerate() {
+                let drifts: Vec<f64> =
+                    of_periods.iter().filter_map(|rates| flow.drift(place, rates)).collect();
+                displacement.drift_error = displacement.drift.map(|_| standard_error(&drifts));
+            }
+        }
+        Ok(quantities)
     }
 
     /// Measures a period of contact-free motion in its steady state.
@@ -214,7 +242,7 @@ impl<'f> Meter<'f> {
                 .then(|| [sums.force.high, (sums.force.square / sums.contact_time).sqrt()]),
             displacements: std::array::from_fn(|place| {
                 let of = Displacement::of(&sums.displacements[place], time);
-                let drift = self.flow.drift(place, &sums.drifts);
+                let drift = self.flow.drift(place, &sums.drifts.map(|drift| drift.rate));
                 // The position along a rigid-body mode is arbitrary, so the mean is removed.
                 let without_mean = || (of.rms.powi(2) - of.mean.powi(2)).max(0.0).sqrt();
                 let [mean, rms] = drift.map_or([of.mean, of.rms], |_| [0.0, without_mean()]);
@@ -228,6 +256,12 @@ impl<'f> Meter<'f> {
             gaps: (self.flow.gap_count() > 1).then(|| sums.gaps.map(of_gap)),
         }
     }
+}
+
+/// Returns the mean rates along all rigid-body modes from one point of a trajectory to another, which is `periods` later.
+fn drift_rates(flow: &Flow, ends: [&Trajectory<'_>; 2], periods: u32) -> [f64; MOST_COORDINATES] {
+    let [from, to] = ends.map(Trajectory::travelled);
+    std::array::from_fn(|nth| (to[nth] - from[nth]) / (f64::from(periods) * flow.period))
 }
 
 impl Observer for Meter<'_> {
