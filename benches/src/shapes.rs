@@ -107,6 +107,7 @@ impl Chain {
             drives: (1..=self.harmonics).map(drive).collect(),
             gaps: (0..self.gaps).map(gap).collect(),
             friction: Vec::new(),
+            springs: Vec::new(),
             signals: Vec::new(),
             timing: Timing::Forced,
         }

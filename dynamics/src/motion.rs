@@ -16,6 +16,7 @@ mod trajectory;
 
 pub use allowance::Allowance;
 pub(crate) use clock::Clock;
+pub(crate) use event::Remark;
 pub use event::{
     EVENTS_PER_PERIOD_CAP, EventKind, GapEvent, Observer, STEPS_PER_PERIOD_CAP, SlipEvent, SlipKind, States,
     Stop, Work,

@@ -44,7 +44,7 @@ use section::Section;
 pub use trace::trace;
 
 use crate::model::{Side, State};
-use crate::motion::Slips;
+use crate::motion::{Remark, Slips};
 use crate::named;
 use crate::word::Word;
 
@@ -160,6 +160,17 @@ named! {
         UnstableCycle = "unstable_cycle",
         /// Two gaps that affect each other reached their walls at the same time, and their order in the model decided the motion.
         Simultaneous = "simultaneous",
+        /// A nonlinear spring or a wall's curve was deformed beyond its range, where its last piece goes on.
+        OutOfRange = "out_of_range",
+    }
+}
+
+impl From<Remark> for Status {
+    fn from(remark: Remark) -> Status {
+        match remark {
+            Remark::OutOfRange => Status::OutOfRange,
+            Remark::Tie => Status::Simultaneous,
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
 use super::pair::has_negative_preload;
-use rattlemap_dynamics::model::{Contact, Form, Pair, Side, Timing};
+use rattlemap_dynamics::model::{Contact, DryFriction, Form, Pair, Side, Timing};
 
 /// The features of one or more oscillators, or the features that a shader supports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -27,6 +27,8 @@ pub struct Features {
     pub too_many_domains: bool,
     /// Machines without force, whose cycles have periods of their own.
     pub unforced: bool,
+    /// Nonlinear springs, and friction that depends on the sliding rate or is larger at rest. No shader supports them.
+    pub curves: bool,
 }
 
 impl Features {
@@ -38,6 +40,7 @@ impl Features {
                 machine: Some(MachineShape::of(&machine)),
                 too_many_domains: domain_count(&machine) > MOST_DOMAINS,
                 unforced: machine.timing != Timing::Forced,
+                curves: !machine.springs.is_empty() || !machine.friction.iter().all(DryFriction::is_constant),
                 ..Features::default()
             },
         }
@@ -57,6 +60,7 @@ impl Features {
             machine: None,
             too_many_domains: false,
             unforced: false,
+            curves: false,
         }
     }
 
@@ -76,6 +80,7 @@ impl Features {
             },
             too_many_domains: self.too_many_domains || other.too_many_domains,
             unforced: self.unforced || other.unforced,
+            curves: self.curves || other.curves,
         }
     }
 
@@ -94,12 +99,13 @@ impl Features {
         self.machine.map_or(4, |shape| shape.dim() + MODES)
     }
 
-    fn without_code(self) -> [(bool, &'static str, &'static str); 3] {
+    fn without_code(self) -> [(bool, &'static str, &'static str); 4] {
         let preload = "a wall that only pushes and has a negative preload";
         [
             (self.too_many_domains, "more than 4096 combinations of modes", "too_many_domains"),
             (self.negative_preload, preload, "negative_preload"),
             (self.unforced, "motion without force", "unforced"),
+            (self.curves, "nonlinear springs, or friction that is not constant", "curves"),
         ]
     }
 

@@ -2,6 +2,7 @@
 
 use rattlemap_dynamics::model::{Contact, MOST_WALLS, Side};
 
+use super::curve::ForceLaw;
 use super::entry::{Entry, Names, Staged};
 use super::motion::{self, Gap};
 use crate::text::error::SceneError;
@@ -9,8 +10,21 @@ use crate::text::expression::Expression;
 use crate::text::section::{Field, Section};
 
 /// Keys of `[[contact]]`.
-const CONTACT_KEYS: [&str; 10] =
-    ["gap", "side", "at", "law", "restitution", "mesh_speed", "stiffness", "damping", "preload", "pull"];
+const CONTACT_KEYS: [&str; 13] = [
+    "gap",
+    "side",
+    "at",
+    "law",
+    "restitution",
+    "mesh_speed",
+    "stiffness",
+    "damping",
+    "preload",
+    "pull",
+    "force",
+    "depth_max",
+    "tolerance",
+];
 
 /// Name of the approach speed in restitution.
 const SPEED: &str = "speed";
@@ -24,6 +38,8 @@ pub struct Wall {
     pub law: WallLaw,
     /// Spring and damper behind the wall; none for a rigid wall.
     pub spring: Option<WallSpring>,
+    /// Force as a function of the depth behind the wall, in place of a stiffness.
+    pub curve: Option<ForceLaw>,
 }
 
 /// The law of contact with a wall.
@@ -60,6 +76,7 @@ pub struct WallSpring {
 enum LawKind {
     Impact,
     Elastic,
+    Curve,
 }
 
 impl Wall {
@@ -82,7 +99,8 @@ impl Wall {
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
         let spring =
             self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping, &spring.preload]);
-        spring.flat_map(Entry::values).chain([&self.at])
+        let curve = self.curve.iter().flat_map(ForceLaw::entries);
+        spring.flat_map(Entry::values).chain([&self.at]).chain(curve)
     }
 
     /// Returns the entries on which the contact law depends.
@@ -95,19 +113,19 @@ impl Wall {
     }
 }
 
-/// Reads the walls of each gap on the right and on the left, from the inside to the outside. A model with one gap may have none if it
-/// has friction. `defaults` are those of the parameters.
+/// Reads the walls of each gap on the right and on the left, from the inside to the outside. A model with one gap may have none if
+/// it has friction or nonlinear springs, and so `may_lack_walls`. `defaults` are those of the parameters.
 pub(super) fn read(
     root: &Section<'_>,
     names: Names<'_>,
     gaps: &[Gap],
     defaults: &[f64],
-    has_friction: bool,
+    may_lack_walls: bool,
 ) -> Result<Vec<[Vec<Wall>; 2]>, SceneError> {
     let mut walls: Vec<[Vec<Wall>; 2]> = gaps.iter().map(|_| Default::default()).collect();
-    let remedy = "write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
+    let remedy = "write [[contact]] with side, at and law; only a model with [[friction]] or [[spring]] may have no wall";
     let field = match (root.get("contact"), gaps) {
-        (None, [_]) if has_friction => return Ok(walls),
+        (None, [_]) if may_lack_walls => return Ok(walls),
         (None, _) => return Err(root.missing("contact", remedy)),
         (Some(field), _) => field,
     };
@@ -128,6 +146,11 @@ pub(super) fn read(
         if own.last().is_some_and(|inner| matches!(inner.law, WallLaw::Elastic { pulls: false })) {
             return Err(field.conflict(
                 "the wall before it on this side has `pull = false`, which only the last wall of a side may have",
+            ));
+        }
+        if own.last().is_some_and(|inner| inner.curve.is_some()) {
+            return Err(field.conflict(
+                "the wall before it on this side has law = \"curve\", which only the last wall of a side may have",
             ));
         }
         if own.len() == MOST_WALLS {
@@ -201,11 +224,27 @@ fn read_one<'a>(
     let which = side.choice(&[("right", Side::Right), ("left", Side::Left)])?;
     let at = section.require("at", "write where the wall is, such as at = \"b\"")?;
     let at = names.entry(&at)?;
-    let law = section.require("law", "write law = \"impact\" or law = \"elastic\"")?;
+    let law = section.require("law", "write law = \"impact\", law = \"elastic\" or law = \"curve\"")?;
     let entry = |name: &str| section.get(name).map(|field| names.entry(&field)).transpose();
     let staged = |name: &str| section.get(name).map(|field| Staged::read(&field, names)).transpose();
     let (stiffness, damping, preload) = (staged("stiffness")?, staged("damping")?, staged("preload")?);
-    let law = match law.choice(&[("impact", LawKind::Impact), ("elastic", LawKind::Elastic)])? {
+    let kinds = [("impact", LawKind::Impact), ("elastic", LawKind::Elastic), ("curve", LawKind::Curve)];
+    let kind = law.choice(&kinds)?;
+    let others: &[&str] = match kind {
+        LawKind::Curve => &["stiffness", "preload", "restitution", "mesh_speed"],
+        _ => &["force", "depth_max", "tolerance"],
+    };
+    if let Some(field) = others.iter().find_map(|key| section.get(key)) {
+        return Err(field.conflict(match kind {
+            LawKind::Curve => {
+                "it does not belong to law = \"curve\", whose force is given by `force`; remove it"
+            }
+            _ => "it needs law = \"curve\"; remove it, or change the law",
+        }));
+    }
+    let mut curve = None;
+    let pulls = || section.get("pull").map_or(Ok(true), |field| field.flag());
+    let law = match kind {
         LawKind::Impact => {
             for name in ["preload", "pull"] {
                 if let Some(field) = section.get(name) {
@@ -226,13 +265,17 @@ fn read_one<'a>(
                 }
             }
             section.require("stiffness", "an elastic wall needs the stiffness behind it")?;
-            WallLaw::Elastic { pulls: section.get("pull").map_or(Ok(true), |field| field.flag())? }
+            WallLaw::Elastic { pulls: pulls()? }
+        }
+        LawKind::Curve => {
+            curve = Some(ForceLaw::of_wall(section, names)?);
+            WallLaw::Elastic { pulls: pulls()? }
         }
     };
-    let spring = (stiffness.is_some() || damping.is_some()).then(|| WallSpring {
+    let spring = (stiffness.is_some() || damping.is_some() || curve.is_some()).then(|| WallSpring {
         stiffness: stiffness.unwrap_or_else(Entry::zero),
         damping: damping.unwrap_or_else(Entry::zero),
         preload: preload.unwrap_or_else(Entry::zero),
     });
-    Ok((which, side, Wall { at, law, spring }))
+    Ok((which, side, Wall { at, law, spring, curve }))
 }

@@ -9,6 +9,7 @@ use rattlemap_dynamics::model::{
 };
 
 use super::contact::{self, Wall, WallLaw, WallSpring};
+use super::curve::{self, BentSpring, ForceLaw, wall_spring};
 use super::entry::{Names, Staged};
 use super::friction::{self, DryFriction};
 use super::motion::{self, Clock, MotionTable};
@@ -21,9 +22,9 @@ use crate::text::section::{Field, Section};
 
 /// Keys outside of any table, and the names of the tables.
 #[rustfmt::skip]
-const MODEL_KEYS: [&str; 11] = [
+const MODEL_KEYS: [&str; 12] = [
     "name", "title", "summary", "source", "notes", "parameters", "motion", "harmonic", "contact", "friction",
-    "signal",
+    "spring", "signal",
 ];
 
 /// Largest number of characters of a model's name, which occurs in scenes and file names.
@@ -60,6 +61,8 @@ pub struct Definition {
     pub walls: Vec<[Vec<Wall>; 2]>,
     /// Dry friction.
     pub friction: Vec<DryFriction>,
+    /// Nonlinear springs.
+    pub springs: Vec<BentSpring>,
     /// Signals.
     pub signals: Vec<Signal>,
     /// Whether the oscillator is a pair, whose law is not part of it.
@@ -89,10 +92,12 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let states: Vec<&str> = motion.state_names().collect();
     let names = Names { states: &states, stages: motion.stages.len(), ..names };
     let friction = friction::read(&root, names, motion.degrees())?;
+    let springs = curve::read(&root, names, motion.degrees())?;
     let gaps: Vec<&str> = motion.gaps.iter().filter_map(|gap| gap.name.as_deref()).collect();
     let signals = signal::read(&root, names, &gaps, motion.degrees())?;
     let defaults: Vec<f64> = written.iter().map(|parameter| parameter.default).collect();
-    let walls = contact::read(&root, names, &motion.gaps, &defaults, !friction.is_empty())?;
+    let walls =
+        contact::read(&root, names, &motion.gaps, &defaults, !friction.is_empty() || !springs.is_empty())?;
     let mut definition = Definition {
         text: text.to_owned(),
         title: line("title")?.unwrap_or_else(|| name.clone()),
@@ -105,6 +110,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
         motion,
         walls,
         friction,
+        springs,
         signals,
         is_pair: false,
     };
@@ -174,7 +180,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
                 is_on_side && before == nth
             }
             (Table::Harmonic(order), Some(Value::Integer(own))) => *own == order,
-            (Table::Friction(nth) | Table::Signal(nth), _) => {
+            (Table::Friction(nth) | Table::Spring(nth) | Table::Signal(nth), _) => {
                 before += 1;
                 before == nth
             }
@@ -185,6 +191,7 @@ fn no_motion(root: &Section<'_>, definition: &Definition, error: &ModelError) ->
     let list = match table {
         Table::Harmonic(_) => "harmonic",
         Table::Friction(_) => "friction",
+        Table::Spring(_) => "spring",
         Table::Signal(_) => "signal",
         Table::Motion | Table::Gap(_) | Table::Wall(..) => "contact",
     };
@@ -210,6 +217,8 @@ enum Table {
     Harmonic(i64),
     /// An element with dry friction, counted from 1.
     Friction(usize),
+    /// A nonlinear spring, counted from 1.
+    Spring(usize),
     /// A signal, counted from 1.
     Signal(usize),
 }
@@ -222,10 +231,14 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
         OscillatorError::Walls { walls } => return (Table::Wall(definition.gap_between(*walls), None), "at"),
     };
     if let Some((what, nth)) = quantity.rsplit_once("of friction") {
-        let key = ["force", "speed"].into_iter().find(|key| what.starts_with(key));
+        let key = ["force", "speed", "static"].into_iter().find(|key| what.starts_with(key));
         // The determinant is that of both rows.
         let last = definition.friction.len();
         return (Table::Friction(nth.trim().parse().unwrap_or(last)), key.unwrap_or("row"));
+    }
+    if let Some((what, nth)) = quantity.rsplit_once("of nonlinear spring ") {
+        let key = ["row", "range", "tolerance"].into_iter().find(|key| what.starts_with(key));
+        return (Table::Spring(nth.parse().unwrap_or(1)), key.unwrap_or("force"));
     }
     if let Some((_, nth)) = quantity.rsplit_once("of signal ") {
         return (Table::Signal(nth.parse().unwrap_or(1)), "name");
@@ -261,9 +274,18 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
         "load" if side.is_some() => (Table::Wall(gap, side), "at"),
         "mesh" | "mesh_speed" => (Table::Wall(gap, side), "mesh_speed"),
         "restitution" | "slope" | "exponent" => (Table::Wall(gap, side), "restitution"),
-        key @ ("damping" | "stiffness" | "preload") if side.is_some() => (Table::Wall(gap, side), key),
+        "range" if side.is_some() => (Table::Wall(gap, side), "depth_max"),
+        key @ ("damping" | "stiffness" | "preload" | "force" | "tolerance") if side.is_some() => {
+            (Table::Wall(gap, side), key)
+        }
         key => (Table::Motion, key),
     }
+}
+
+/// Returns how messages name a wall, which is counted from 1.
+fn wall_name(motion: &MotionTable, (gap, side): (usize, Side), nth: usize) -> String {
+    let of_gap = if motion.gaps.len() == 1 { String::new() } else { format!(" of gap {}", gap + 1) };
+    format!("{} wall {nth}{of_gap}", super::side(side))
 }
 
 impl Definition {
@@ -274,6 +296,7 @@ impl Definition {
         let oscillator = self.motion.entries().any(uses)
             || walls().flat_map(Wall::shaping_oscillator).any(uses)
             || self.friction.iter().flat_map(DryFriction::entries).any(uses)
+            || self.springs.iter().flat_map(BentSpring::entries).any(uses)
             || self.signals.iter().flat_map(Signal::entries).any(uses);
         let law = walls().flat_map(Wall::shaping_law).any(uses);
         // The laws of a machine are part of it.
@@ -289,6 +312,13 @@ impl Definition {
     pub(super) fn is_unforced(&self) -> bool {
         let mut waves = self.signals.iter().flat_map(|signal| &signal.constants[1..]);
         self.motion.is_unforced && waves.all(|wave| wave.as_number() == Some(0.0))
+    }
+
+    /// Returns the walls whose force is a function of the depth: gap and side, number from 1, and force.
+    pub fn curves(&self) -> impl Iterator<Item = ((usize, Side), usize, &ForceLaw)> {
+        let gaps = self.walls.iter().enumerate();
+        let sides = gaps.flat_map(|(gap, walls)| Side::BOTH.map(|side| ((gap, side), &walls[side.index()])));
+        sides.filter_map(|(place, walls)| Some((place, walls.len(), walls.last()?.curve.as_ref()?)))
     }
 
     /// Returns the index of the gap whose first walls have these positions at the defaults; 0 if there is none.
@@ -322,13 +352,8 @@ impl Definition {
         let gap = |nth: usize| {
             let side = |side: Side| {
                 let walls = (1..).zip(&self.walls[nth][side.index()]);
-                let built = walls.map(|(i, wall)| {
-                    let of_gap = match motion.gaps.len() {
-                        1 => String::new(),
-                        _ => format!(" of gap {}", nth + 1),
-                    };
-                    values.wall(wall, stages, &format!("{} wall {i}{of_gap}", super::side(side)))
-                });
+                let built =
+                    walls.map(|(i, wall)| values.wall(wall, stages, &wall_name(motion, (nth, side), i)));
                 built.collect::<Result<Vec<_>, _>>()
             };
             Ok(GapRow {
@@ -336,6 +361,19 @@ impl Definition {
                 walls: [side(Side::Right)?, side(Side::Left)?],
             })
         };
+        let gaps: Vec<GapRow> = (0..motion.gaps.len()).map(gap).collect::<Result<_, OscillatorError>>()?;
+        let springs = (1..).zip(&self.springs).map(|(nth, spring)| spring.evaluated(values.0, nth));
+        let mut springs = springs.collect::<Result<Vec<_>, _>>()?;
+        for (place, nth, law) in self.curves() {
+            let (gap, side) = place;
+            let pieces = law.pieces(values.0, &wall_name(motion, place, nth))?;
+            springs.push(wall_spring(
+                &gaps[gap].row,
+                place,
+                gaps[gap].walls[side.index()][nth - 1].at,
+                pieces,
+            ));
+        }
         let phases: Vec<f64> = motion.stages.iter().map(|phase| values.of(phase)).collect();
         let oscillator = Oscillator {
             omega: 1.0,
@@ -343,8 +381,9 @@ impl Definition {
             stages: (0..stages).map(forces).collect(),
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
             drives: acts.then_some(first).into_iter().chain(further).collect(),
-            gaps: (0..motion.gaps.len()).map(gap).collect::<Result<_, OscillatorError>>()?,
+            gaps,
             friction: self.friction.iter().map(|own| own.evaluated(|entry| values.of(entry))).collect(),
+            springs,
             signals,
             timing: if self.is_unforced() { Timing::Free } else { Timing::Forced },
         };

@@ -2,7 +2,7 @@
 
 use rattlemap_dynamics::model::{Contact, Side};
 
-use super::contact::WallLaw;
+use super::contact::{Wall, WallLaw};
 use super::definition::Definition;
 use super::entry::{Entry, Staged};
 use super::friction::DryFriction;
@@ -25,7 +25,27 @@ pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<Strin
     lines.extend(stages(motion));
     lines.extend(acting(definition).map(|friction| {
         let rate = sliding_rate(friction, motion);
-        format!("friction  sticks at {rate} = 0 while |friction force| <= {}", text(&friction.force))
+        let limit = text(friction.static_force.as_ref().unwrap_or(&friction.force));
+        let point = |[rate, force]: &[Expression; 2]| format!(", {} at {}", text(force), text(rate));
+        let further: String = friction.at_speed.iter().map(point).collect();
+        let force = match further.is_empty() {
+            true => String::new(),
+            false => format!(
+                "; f(r) = {} at r = 0{further}, linear between, constant beyond",
+                text(&friction.force)
+            ),
+        };
+        format!("friction  sticks at {rate} = 0 while |friction force| <= {limit}{force}")
+    }));
+    lines.extend(definition.springs.iter().enumerate().map(|(i, spring)| {
+        let (of, [low, high]) = (row(&spring.row, &motion.coordinates, "x"), &spring.law.range);
+        let (name, pieces) = (spring_name(definition, i), spring.law.described(&definition.defaults));
+        let force = text(&spring.law.force);
+        format!(
+            "spring  {name} = {force} at the elongation {of}, from {} to {}{pieces}",
+            text(low),
+            text(high)
+        )
     }));
     lines.extend(definition.signals.iter().map(|signal| signal_line(signal, motion)));
     let forces: Vec<_> = suffixes.iter().map(|suffix| Some(format!("N{}", suffix.as_ref()?))).collect();
@@ -49,6 +69,7 @@ fn matrices(definition: &Definition, suffixes: &[Option<String>]) -> Vec<String>
         term("C", &motion.damping, " x'"),
         term("K", &motion.stiffness, " x"),
         friction,
+        (!definition.springs.is_empty()).then(|| "springs".to_owned()),
     ];
     let further = motion.harmonics.iter().flat_map(|harmonic| [&harmonic.cos, &harmonic.sin]);
     let is_forced =
@@ -87,15 +108,19 @@ pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[S
                     WallLaw::Impact { restitution, mesh_speed, .. } => {
                         ("impact", [restitution, mesh_speed].map(text))
                     }
-                    WallLaw::Elastic { pulls: true } => ("elastic", Default::default()),
-                    WallLaw::Elastic { pulls: false } => ("elastic, only pushes", Default::default()),
+                    WallLaw::Elastic { pulls } => (elastic_law(wall, *pulls), Default::default()),
                 };
                 let force = match &wall.spring {
                     None => format!("keeps {z} = {} while pressed", text(&wall.at)),
                     Some(spring) => {
                         let preload = constant(&spring.preload);
+                        let depth = minus(z, &wall.at);
+                        let curve = wall.curve.as_ref().map(|law| {
+                            let force = format!("({})", text(&law.force));
+                            if side == Side::Right { force } else { negative(force) }
+                        });
                         let own = [
-                            product(&spring.stiffness, &format!("({})", minus(z, &wall.at))),
+                            curve.or_else(|| product(&spring.stiffness, &format!("({depth})"))),
                             product(&spring.damping, w),
                             if side == Side::Right { preload } else { preload.map(negative) },
                         ];
@@ -105,7 +130,8 @@ pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[S
                         } else {
                             forces.extend(own);
                         }
-                        sum(forces.clone())
+                        let pieces = wall.curve.as_ref().map(|law| law.described(&definition.defaults));
+                        sum(forces.clone()) + &pieces.unwrap_or_default()
                     }
                 };
                 let name = format!("{}{nth}{of_gap}", super::side(side));
@@ -114,6 +140,20 @@ pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[S
         }
     }
     rows
+}
+
+fn elastic_law(wall: &Wall, pulls: bool) -> &'static str {
+    match (wall.curve.is_some(), pulls) {
+        (false, true) => "elastic",
+        (false, false) => "elastic, only pushes",
+        (true, true) => "curve",
+        (true, false) => "curve, only pushes",
+    }
+}
+
+/// Returns the name of a nonlinear spring's force.
+fn spring_name(definition: &Definition, i: usize) -> String {
+    if definition.springs.len() == 1 { "S".to_owned() } else { format!("S{}", i + 1) }
 }
 
 fn row(entries: &[Expression], names: &[String], result: &str) -> String {
@@ -149,7 +189,10 @@ fn signal_line(signal: &Signal, motion: &MotionTable) -> String {
 
 /// Returns the friction whose force is not the number 0.
 fn acting(definition: &Definition) -> impl Iterator<Item = &DryFriction> {
-    definition.friction.iter().filter(|friction| friction.force.as_number() != Some(0.0))
+    definition
+        .friction
+        .iter()
+        .filter(|friction| friction.entries_of_force().any(|one| one.as_number() != Some(0.0)))
 }
 
 /// Returns the sliding rate, such as `x1' - x2' - speed`.
@@ -160,8 +203,12 @@ fn sliding_rate(friction: &DryFriction, motion: &MotionTable) -> String {
 
 /// Returns the friction force on the `i`-th coordinate; none if there is none.
 fn friction_force(friction: &DryFriction, motion: &MotionTable, i: usize) -> Option<String> {
-    let sign = format!("sgn({})", sliding_rate(friction, motion));
+    let rate = sliding_rate(friction, motion);
+    let sign = format!("sgn({rate})");
     let (row, force) = (&friction.row[i], &friction.force);
+    if !friction.at_speed.is_empty() {
+        return product(row, &format!("f(|{rate}|) {sign}"));
+    }
     match row.as_number() {
         Some(0.0) => None,
         Some(1.0) => product(force, &sign),
@@ -185,6 +232,9 @@ fn equations(definition: &Definition, forces: &[Option<String>]) -> impl Iterato
             terms(&motion.damping[i], &rates),
             terms(&motion.stiffness[i], &displacements),
             acting(definition).map(|friction| friction_force(friction, motion, i)).collect(),
+            (definition.springs.iter().enumerate())
+                .map(|(nth, spring)| product(&spring.row[i], &spring_name(definition, nth)))
+                .collect(),
             along,
         ];
         let further = motion.harmonics.iter().flat_map(|h| waves(motion, h.order, [&h.cos[i], &h.sin[i]]));

@@ -7,6 +7,7 @@
 
 mod builtin;
 mod contact;
+mod curve;
 mod definition;
 mod entry;
 mod equations;
@@ -25,6 +26,7 @@ use rattlemap_dynamics::orbit::DISPLACEMENTS;
 
 pub use builtin::{BUILT_IN, DEFAULT, MODEL_FILE};
 pub use contact::{Wall, WallLaw, WallSpring};
+pub use curve::{BentSpring, ForceLaw, Pieces};
 pub use definition::Definition;
 pub use entry::Staged;
 pub use friction::DryFriction;

@@ -692,11 +692,8 @@ fn with_friction() -> String {
 fn friction_is_read_in_the_order_of_the_file() {
     let model = read(&with_friction());
     let bare = read(TWO_DEGREES).oscillator().unwrap();
-    let element = |row: [f64; 2], force: f64, speed: f64| DryFriction {
-        row: DVector::from_row_slice(&row),
-        force,
-        speed,
-    };
+    let element =
+        |row: [f64; 2], force: f64, speed: f64| DryFriction::new(DVector::from_row_slice(&row), force, speed);
     let friction = vec![element([2.0, -1.0], 0.2 * 3.0, -0.75), element([1.0, 0.0], 0.5, 0.0)];
     assert_eq!(model.oscillator().unwrap(), Oscillator { friction, ..bare });
     for name in ["mu", "u"] {
@@ -722,7 +719,8 @@ fn a_model_with_friction_needs_no_walls_and_no_row_for_one_coordinate() {
         schedule: Vec::new(),
         drives: vec![Drive { order: 1, cos: row(6.0), sin: row(0.0) }],
         gaps: vec![GapRow { row: row(1.0), walls: [vec![], vec![]] }],
-        friction: vec![DryFriction { row: row(1.0), force: 1.5, speed: 0.0 }],
+        friction: vec![DryFriction::new(row(1.0), 1.5, 0.0)],
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     };
@@ -795,7 +793,7 @@ gap = [1] | gap = [1]\nfriction = 1 | unknown field `motion.friction = 1`
 "#,
     );
     let (motion, _) = ONE_DEGREE.split_once("[[contact]]").unwrap();
-    let end = "`contact` is missing; write [[contact]] with side, at and law; only a model with [[friction]] may have no wall";
+    let end = "`contact` is missing; write [[contact]] with side, at and law; only a model with [[friction]] or [[spring]] may have no wall";
     check_refusal(motion, end);
 }
 
@@ -911,7 +909,8 @@ fn a_model_of_three_coordinates_and_two_gaps_is_a_machine() {
             GapRow { row: row([1.0, -1.0, 0.0]), walls: [vec![], vec![left]] },
             GapRow { row: row([0.0, 1.0, -0.5]), walls: [vec![elastic, impact], vec![]] },
         ],
-        friction: vec![DryFriction { row: row([0.0, 0.0, 2.0]), force: 0.2 * 3.0, speed: 0.8 }],
+        friction: vec![DryFriction::new(row([0.0, 0.0, 2.0]), 0.2 * 3.0, 0.8)],
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     };

@@ -207,6 +207,7 @@ fn status(status: Status) -> &'static str {
         Status::Simultaneous => {
             "simultaneous: two gaps reached their walls together; their order in the model decides"
         }
+        Status::OutOfRange => "out_of_range: a nonlinear spring or wall was deformed beyond its range",
         Status::Accelerates => "accelerates: a load accelerates the motion for ever, and nothing opposes it",
     }
 }

@@ -489,6 +489,7 @@ fn row_of_three(phase: f64) -> Oscillator {
         ],
         gaps: vec![gap([1.0, -1.0, 0.0], 0.3), gap([0.0, 1.0, -1.0], 0.5)],
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }
@@ -593,6 +594,7 @@ fn dropped(restitution: Restitution) -> Oscillator {
         drives: Vec::new(),
         gaps: vec![GapRow { row: DVector::from_element(1, 1.0), walls: [Vec::new(), vec![wall]] }],
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }
@@ -749,8 +751,7 @@ fn the_work_of_the_force_is_what_dampers_friction_and_impacts_take() {
         [(190.0, 4e-4, 0.5), (150.0, 4e-4, 1.0), (250.0, 3e-4, 0.3), (120.0, 6e-4, 2.0)]
     {
         let mut machine = machine("two-loose-gears", &[("omega", omega), ("A", swing), ("e", 0.6)]);
-        machine.friction =
-            vec![DryFriction { row: DVector::from_vec(vec![0.0, 1.0, 0.0]), force: friction, speed: 0.0 }];
+        machine.friction = vec![DryFriction::new(DVector::from_vec(vec![0.0, 1.0, 0.0]), friction, 0.0)];
         let flow = Flow::new(Form::Machine(machine.clone()));
         let orbit = analyse_flow(&flow, Law::both(0.0, 0.0), REST, &SHORT, 8);
         let Class::Periodic { period } = orbit.class else { panic!("{:?} {:?}", orbit.class, orbit.status) };

@@ -7,6 +7,7 @@ use wide::f64x4;
 
 use super::constraints::{Constraint, Constraints, NO_MOBILITY};
 use super::frame::Frame;
+use super::modes::{Pieces, signed};
 use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
 use super::{Numbers, PhasePoint, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
@@ -31,6 +32,7 @@ pub(super) struct DomainKey {
     /// The rigid wall that each gap rests on.
     pub(super) held: [Option<Side>; MOST_GAPS],
     pub(super) slips: [Slip; MOST_FRICTION],
+    pub(super) pieces: Pieces,
 }
 
 /// A linear functional of a [`PhasePoint`], also called a row.
@@ -140,13 +142,29 @@ impl LinearDomain {
                 load[gap] += spring.stiffness * wall.at - side.sign() * spring.preload;
             }
         }
-        for (element, slip) in system.elements.iter().zip(key.slips) {
-            load -= &element.row * (slip.sign() * element.force);
+        // Friction resists, but its power is not that of a damper.
+        let mut resistance = damping.clone();
+        for ((element, slip), piece) in system.elements.iter().zip(key.slips).zip(key.pieces) {
+            if slip != Slip::Stick {
+                let [slope, force] = element.curve.pieces[usize::from(piece)];
+                load -= &element.row * (slip.sign() * force - slope * element.speed);
+                resistance += &element.row * element.row.transpose() * slope;
+            }
+        }
+        for (spring, &piece) in system.springs.iter().zip(&key.pieces[MOST_FRICTION..]) {
+            if let Some((gap, side)) = spring.wall
+                && key.engaged[gap] != signed(side, system.walls(gap, side).len())
+            {
+                continue;
+            }
+            let [slope, force] = spring.curve.pieces[usize::from(piece)];
+            load -= &spring.row * force;
+            stiffness += &spring.row * spring.row.transpose() * slope;
         }
         // Rows of the forces on each coordinate, without constraints.
         let mut rows = DMatrix::zeros(n, width);
         rows.view_mut((0, 0), (n, n)).copy_from(&-&stiffness);
-        rows.view_mut((0, n), (n, n)).copy_from(&-&damping);
+        rows.view_mut((0, n), (n, n)).copy_from(&-&resistance);
         for (k, [cos, sin]) in system.drives.iter().enumerate() {
             rows.set_column(2 * (n + k), cos);
             rows.set_column(2 * (n + k) + 1, sin);
@@ -180,7 +198,7 @@ impl LinearDomain {
             rates: system.orders.iter().map(|order| order * system.machine.omega).collect(),
             accelerations: (0..n).map(|i| row(&bound, i)).collect(),
             is_still,
-            unit: RADIUS / system.rate(&stiffness, &damping),
+            unit: RADIUS / system.rate(&stiffness, &resistance),
             damping,
             pushes,
             holds,

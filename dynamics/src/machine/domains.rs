@@ -76,7 +76,7 @@ impl System {
         gaps && (0..self.elements.len()).filter(|&i| at_rest.elements[i]).all(|i| match modes.slips[i] {
             Slip::Stick => domain.holds[i].as_ref().is_none_or(|hold| {
                 let [value, size] = hold.value_and_size(point);
-                value.abs() <= self.elements[i].force + ROUNDING * size
+                value.abs() <= self.elements[i].static_force + ROUNDING * size
             }),
             slip => slip.sign() * domain.first_derivative(&self.rate_row(i), point, 1).1 > 0.0,
         })
@@ -91,7 +91,7 @@ impl System {
             .map(|mut number| {
                 let mut tried = *modes;
                 for i in elements().rev() {
-                    tried.slips[i] = Slip::ALL[number % Slip::ALL.len()];
+                    (tried.slips[i], tried.pieces[i]) = (Slip::ALL[number % Slip::ALL.len()], 0);
                     number /= Slip::ALL.len();
                 }
                 for (gap, side) in gaps() {

@@ -5,8 +5,8 @@ use nalgebra::DVector;
 use super::PhasePoint;
 use super::domain::{DomainKey, Functional, LinearDomain, Path};
 use super::frame::{Element, Frame};
-use super::modes::Modes;
-use crate::model::{Side, Signal};
+use super::modes::{Modes, signed};
+use crate::model::{MOST_FRICTION, Side, Signal};
 use crate::motion::Slip;
 use crate::motion::{Moments, Sums, nodes, place_of_displacement, place_of_gap, place_of_signal, root};
 
@@ -138,7 +138,8 @@ impl Flight<'_> {
     fn heat(&self, point: &PhasePoint) -> f64 {
         let elements = self.system.elements.iter().enumerate().zip(self.modes.slips);
         let power = |((i, element), slip): ((usize, &Element), Slip)| {
-            element.force * slip.sign() * self.system.rate_row(i).dot(point)
+            let rate = slip.sign() * self.system.rate_row(i).dot(point);
+            element.curve.at(rate) * rate
         };
         elements.map(power).sum()
     }
@@ -185,7 +186,24 @@ impl Frame {
             row.0[self.n + gap] += sign * spring.damping;
             row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width());
         }
+        let is_last = key.engaged[gap] == signed(side, self.walls(gap, side).len());
+        if let Some(i) = self.curve_of_wall(gap, side).filter(|_| is_last) {
+            let [slope, force] = self.springs[i - MOST_FRICTION].curve.pieces[usize::from(key.pieces[i])];
+            row.0[gap] += sign * slope;
+            row = row.plus(force, self.width());
+        }
         row
+    }
+
+    /// Returns the energy that springs and preload of a wall hold in a stage, for a gap `z` behind the wall.
+    pub(super) fn stored(&self, stage: usize, gap: usize, side: Side, number: usize, z: f64) -> f64 {
+        let walls = self.walls(gap, side);
+        let curve = self.curve_of_wall(gap, side).filter(|_| number + 1 == walls.len());
+        let of_curve = curve.map_or(0.0, |i| {
+            let sign = side.sign();
+            self.springs[i - MOST_FRICTION].curve.integral(sign * walls[number].at, sign * z)
+        });
+        walls[number].stored(stage, side, z) + of_curve
     }
 
     /// Returns the part of the energy that events change: kinetic energy, and the energy of springs and preloads of contacts.
@@ -196,8 +214,8 @@ impl Frame {
             (0..n).map(|i| rates[i] * (0..n).map(|j| self.mass[(i, j)] * rates[j]).sum::<f64>()).sum();
         let of_gap = |gap: usize| {
             let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
-            let walls = &self.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())];
-            walls.iter().map(|wall| wall.stored(modes.stage, side, y[gap])).sum::<f64>()
+            let numbers = 0..usize::from(key.engaged[gap].unsigned_abs());
+            numbers.map(|number| self.stored(modes.stage, gap, side, number, y[gap])).sum::<f64>()
         };
         0.5 * kinetic + (0..self.gaps()).map(of_gap).sum::<f64>()
     }

@@ -4,7 +4,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::domain::RADIUS;
 use super::{Numbers, PhasePoint, ROUNDING, SIZE};
-use crate::model::{Contact, Oscillator, RigidMode, RigidModes, Side, Wall};
+use crate::model::{
+    Contact, Curve, MOST_FRICTION, NonlinearSpring, Oscillator, RigidMode, RigidModes, Side, Wall,
+};
 
 /// Linear forces in the coordinates of the flow.
 #[derive(Clone, Debug)]
@@ -14,13 +16,23 @@ pub(super) struct StageForces {
     pub(super) load: DVector<f64>,
 }
 
-/// An element with dry friction: its place in the model, factors of `w` in the sliding rate, force and speed.
+/// An element with dry friction: its place in the model, factors of `w` in the sliding rate, force as a function of the modulus of this
+/// rate, largest force while it sticks, and speed.
 #[derive(Clone, Debug)]
 pub(super) struct Element {
     pub(super) index: usize,
     pub(super) row: DVector<f64>,
-    pub(super) force: f64,
+    pub(super) curve: Curve,
+    pub(super) static_force: f64,
     pub(super) speed: f64,
+}
+
+/// A nonlinear spring: factors of `d` in its elongation, its force, and the wall with which it acts.
+#[derive(Clone, Debug)]
+pub(super) struct SpringElement {
+    pub(super) row: DVector<f64>,
+    pub(super) curve: Curve,
+    pub(super) wall: Option<(usize, Side)>,
 }
 
 impl Element {
@@ -68,6 +80,7 @@ pub struct Frame {
     pub(super) orders: Vec<f64>,
     pub(super) drives: Vec<[DVector<f64>; 2]>,
     pub(super) elements: Vec<Element>,
+    pub(super) springs: Vec<SpringElement>,
     /// Changes of the stage: time since phase 0, and stage.
     pub(super) schedule: Vec<(f64, usize)>,
     /// Rigid-body modes, and in the coordinates of the flow.
@@ -97,16 +110,26 @@ impl Frame {
                 load: &back * &forces.load,
             })
             .collect();
-        let with_force = machine.friction.iter().enumerate().filter(|(_, friction)| friction.force > 0.0);
+        let with_force = machine.friction.iter().enumerate().filter(|(_, friction)| friction.acts());
+        // Entries that are zero without rounding are set to zero, so that a row along a gap has no other entries.
+        let in_flow = |row: &DVector<f64>| {
+            let row = &back * row;
+            let least = ROUNDING * row.amax();
+            row.map(|x| if x.abs() > least { x } else { 0.0 })
+        };
         let elements = with_force
             .map(|(index, friction)| {
-                let row = &back * &friction.row;
-                // Entries that are zero without rounding are set to zero, so that a row along a gap has no other entries.
-                let least = ROUNDING * row.amax();
-                let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
-                Element { index, row, force: friction.force, speed: friction.speed }
+                let row = in_flow(&friction.row);
+                let (curve, static_force) = (friction.curve(), friction.static_force);
+                Element { index, row, curve, static_force, speed: friction.speed }
             })
             .collect();
+        let spring = |spring: &NonlinearSpring| SpringElement {
+            row: in_flow(&spring.row),
+            curve: spring.curve(),
+            wall: spring.wall,
+        };
+        let springs = machine.springs.iter().map(spring).collect();
         let period = machine.period();
         let length = machine.length_scale();
         let kick = |gap: usize| {
@@ -149,10 +172,12 @@ impl Frame {
             mass_scale,
             stages,
             elements,
+            springs,
             machine,
         };
-        let rate = |forces: &StageForces| frame.rate(&forces.stiffness, &forces.damping);
-        let rates: Vec<f64> = frame.stages.iter().map(rate).collect();
+        let at_rest = |stage: usize| &back * frame.machine.stiffness_at_rest(stage) * &frame.from_flow;
+        let rate = |stage: usize| frame.rate(&at_rest(stage), &frame.stages[stage].damping);
+        let rates: Vec<f64> = (0..frame.stages.len()).map(rate).collect();
         frame.speed = length * rates.iter().copied().fold(0.0, f64::max);
         frame.longest_step = RADIUS / rates.into_iter().fold(f64::INFINITY, f64::min);
         if frame.can_grow() {
@@ -167,7 +192,10 @@ impl Frame {
             let scaled = self.mass_scaled(&(0.5 * (matrix + matrix.transpose()))).symmetric_eigenvalues();
             scaled.min() < -1e-12 * scaled.amax()
         };
+        let falls = |spring: &SpringElement| spring.curve.pieces.iter().any(|[slope, _]| *slope < 0.0);
+        let mut free = self.springs.iter().filter(|spring| spring.wall.is_none());
         self.stages.len() > 1
+            || free.any(falls)
             || self.stages.iter().any(|forces| is_negative(&forces.stiffness) || is_negative(&forces.damping))
     }
 
@@ -214,6 +242,12 @@ impl Frame {
     /// Returns the last wall of a side, which must have walls.
     pub(super) fn last_wall(&self, gap: usize, side: Side) -> &Wall {
         self.walls(gap, side).last().expect("there is a wall on this side")
+    }
+
+    /// Returns the number of the curve of a side's last wall, if this wall has a nonlinear spring.
+    pub(super) fn curve_of_wall(&self, gap: usize, side: Side) -> Option<usize> {
+        let spring = self.springs.iter().position(|spring| spring.wall == Some((gap, side)));
+        spring.map(|spring| MOST_FRICTION + spring)
     }
 
     /// Returns the last wall of a side if it only pushes and has a damper or a preload. Without both it never pulls, like any elastic wall.

@@ -199,6 +199,7 @@ impl Impact<'_> {
                 at_rest.elements[i] = modes.slips[i] == Slip::Stick;
             }
         }
+        modes.pieces = system.pieces_at(&modes.slips, point);
         match system.consistent(&modes, &at_rest, point) {
             Some(chosen) => (chosen, true),
             None => (modes, false),

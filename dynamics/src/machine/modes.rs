@@ -1,8 +1,9 @@
 //! Modes of walls and friction.
 
+use super::PhasePoint;
 use super::domain::{DomainKey, Functional};
 use super::frame::Frame;
-use crate::model::{MOST_FRICTION, MOST_GAPS, Side};
+use crate::model::{Curve, MOST_FRICTION, MOST_GAPS, MOST_SPRINGS, Side};
 use crate::motion::{Slip, Slips};
 
 /// The mode of a gap.
@@ -45,7 +46,14 @@ pub(super) struct Modes {
     pub(super) stage: usize,
     pub(super) gaps: [GapMode; MOST_GAPS],
     pub(super) slips: Slips,
+    pub(super) pieces: Pieces,
 }
+
+/// Numbers of the pieces of all curves: those of friction forces, then those of nonlinear springs.
+pub(super) type Pieces = [u8; MOST_CURVES];
+
+/// Largest number of curves.
+pub(super) const MOST_CURVES: usize = MOST_FRICTION + MOST_SPRINGS;
 
 impl Modes {
     pub(super) fn key(&self, system: &Frame) -> DomainKey {
@@ -54,6 +62,7 @@ impl Modes {
             engaged: [0; MOST_GAPS],
             held: [None; MOST_GAPS],
             slips: self.slips,
+            pieces: self.pieces,
         };
         for gap in 0..system.gaps() {
             let count = |side: Side| system.walls(gap, side).len();
@@ -113,10 +122,16 @@ impl Frame {
         (is_last && self.pushing(gap, side).is_some()).then_some(side)
     }
 
-    /// Returns the row of the force of a wall that only pushes.
-    pub(super) fn force(&self, stage: usize, gap: usize, side: Side) -> Functional {
+    /// Returns the row of the force of a side's last wall, positive where it pushes.
+    pub(super) fn force(&self, stage: usize, pieces: &Pieces, gap: usize, side: Side) -> Functional {
         let (wall, sign) = (self.last_wall(gap, side), side.sign());
-        let spring = wall.springs[stage];
+        let mut spring = wall.springs[stage];
+        if let Some(i) = self.curve_of_wall(gap, side) {
+            // The elongation is `sign` times the gap.
+            let [slope, force] = self.springs[i - MOST_FRICTION].curve.pieces[usize::from(pieces[i])];
+            spring.preload += force + sign * slope * wall.at;
+            spring.stiffness += slope;
+        }
         let mut row = Functional::ZERO;
         row.0[gap] = sign * spring.stiffness;
         row.0[self.n + gap] = sign * spring.damping;
@@ -128,6 +143,39 @@ impl Frame {
         let mut row = Functional::ZERO;
         (0..self.n).for_each(|j| row.0[self.n + j] = self.elements[i].row[j]);
         row.plus(-self.elements[i].speed, self.width())
+    }
+
+    /// Returns a curve by its number in [`Pieces`], if it has several pieces and its piece matters.
+    pub(super) fn curve(&self, i: usize, slips: &Slips) -> Option<&Curve> {
+        let curve = match i.checked_sub(MOST_FRICTION) {
+            None => self.elements.get(i).filter(|_| slips[i] != Slip::Stick).map(|element| &element.curve),
+            Some(spring) => self.springs.get(spring).map(|spring| &spring.curve),
+        };
+        curve.filter(|curve| !curve.borders.is_empty())
+    }
+
+    /// Whether a gap is behind the last wall of a side, whose force may be 0 because it only pushes.
+    pub(super) fn is_behind_last(&self, modes: &Modes, gap: usize, side: Side) -> bool {
+        let all = GapMode::Beyond(signed(side, self.walls(gap, side).len()));
+        [all, GapMode::Open(side)].contains(&modes.gaps[gap])
+    }
+
+    /// Returns the row of a curve's argument: the modulus of a sliding rate, or an elongation.
+    pub(super) fn argument(&self, i: usize, slips: &Slips) -> Functional {
+        let Some(spring) = i.checked_sub(MOST_FRICTION) else {
+            return self.rate_row(i).scaled(slips[i].sign());
+        };
+        let mut row = Functional::ZERO;
+        row.0[..self.n].copy_from_slice(self.springs[spring].row.as_slice());
+        row
+    }
+
+    /// Returns the pieces of all curves at a point. The piece of friction that sticks is 0.
+    pub(super) fn pieces_at(&self, slips: &Slips, point: &PhasePoint) -> Pieces {
+        std::array::from_fn(|i| {
+            let piece = |curve: &Curve| curve.piece(self.argument(i, slips).dot(point)) as u8;
+            self.curve(i, slips).map_or(0, piece)
+        })
     }
 
     /// Removes rounding errors from the rates of sticking elements and of gaps at rest.

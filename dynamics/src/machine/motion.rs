@@ -11,12 +11,13 @@ mod tangents;
 use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;
-use super::modes::Modes;
+use super::modes::{MOST_CURVES, Modes};
 use super::watch::{Moment, Roots, Watch};
 use super::{Numbers, PhasePoint};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{
-    Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop, Work,
+    Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, Remark, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop,
+    Work,
 };
 
 /// Largest distance of a gap from its wall that counts as rounding, relative to the wall's position and to the scale of length.
@@ -58,7 +59,7 @@ pub struct MachineMotion<'s> {
     /// Sums of all shifts along rigid-body modes.
     travelled: [f64; MOST_COORDINATES],
     near_grazing: bool,
-    is_tied: bool,
+    remark: Option<Remark>,
     work: Work,
     allowance: Allowance<'s>,
 }
@@ -144,9 +145,9 @@ impl<'s> MachineMotion<'s> {
         self.near_grazing = false;
     }
 
-    /// Whether two gaps have reached their walls at the same time since the start, so that their order in the model decided the motion.
-    pub(crate) fn is_tied(&self) -> bool {
-        self.is_tied
+    /// Returns what makes the motion since the start doubtful.
+    pub(crate) fn remark(&self) -> Option<Remark> {
+        self.remark
     }
 
     /// Returns the counters of work.
@@ -372,10 +373,15 @@ impl<'s> MachineMotion<'s> {
             }
         }
         (self.roots.from_force, self.roots.from_rate) = ([0; MOST_GAPS], [0; MOST_FRICTION]);
+        self.roots.at_border = [None; MOST_CURVES];
     }
 
     /// Processes the root of a watch at the present state, and lets the tangents jump.
     fn cross(&mut self, watch: Watch, observer: &mut dyn Observer) {
+        if let Watch::Border(i, is_upper) = watch {
+            self.pass_border(i, is_upper);
+            return;
+        }
         let moment = self.moment();
         let (row, distance) =
             ((!self.tangents.is_empty()).then(|| moment.function(watch)), moment.distance(watch));

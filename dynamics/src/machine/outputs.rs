@@ -2,6 +2,7 @@
 
 use super::domain::DomainKey;
 use super::domains::System;
+use super::modes::Pieces;
 use crate::model::{Contact, MOST_GAPS, Side};
 use crate::motion::{Slip, Slips};
 
@@ -43,7 +44,7 @@ impl System {
         for (i, element) in self.elements.iter().enumerate() {
             friction[element.index] = match key.slips[i] {
                 Slip::Stick => domain.holds[i].as_ref().map_or(0.0, |hold| hold.dot(&point)),
-                slip => slip.sign() * element.force,
+                slip => slip.sign() * element.curve.at(self.argument(i, &key.slips).dot(&point)),
             };
         }
         let signals = self.machine().signals.iter();
@@ -61,10 +62,13 @@ impl System {
             engaged: [0; MOST_GAPS],
             held: [None; MOST_GAPS],
             slips: Slips::default(),
+            pieces: Pieces::default(),
         };
         for (i, element) in self.elements.iter().enumerate() {
             key.slips[i] = situation.slips[element.index];
         }
+        let pieces = self.pieces_at(&key.slips, &self.point(y, situation.time));
+        key.pieces = pieces;
         for (gap, contact) in situation.contacts.iter().enumerate().take(self.gaps()) {
             let Some(side) = *contact else { continue };
             let (walls, outward) = (self.walls(gap, side), side.sign() * y[self.n + gap]);
@@ -79,7 +83,7 @@ impl System {
             // Rounding of the state may leave a gap at rest just in front of the last of several walls.
             let rests = is_rigid && (walls.len() == 1 || passed == walls.len() || outward == 0.0);
             let is_open = || {
-                let force = self.pushing(gap, side).map(|_| self.force(key.stage, gap, side));
+                let force = self.pushing(gap, side).map(|_| self.force(key.stage, &pieces, gap, side));
                 passed > 1 && force.is_some_and(|force| force.dot(&self.point(y, situation.time)) <= 0.0)
             };
             if rests {

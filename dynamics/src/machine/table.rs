@@ -5,7 +5,7 @@
 use super::domain::{DomainKey, Functional, LinearDomain};
 use super::domains::System;
 use super::frame::{Element, Frame};
-use super::modes::GapMode;
+use super::modes::{GapMode, Pieces};
 use super::motion::MachineMotion;
 use super::{Numbers, SIZE};
 use crate::model::{Contact, MOST_GAPS, Oscillator, Side};
@@ -100,6 +100,7 @@ impl Frame {
                 engaged: [0; MOST_GAPS],
                 held: [None; MOST_GAPS],
                 slips: Slips::default(),
+                pieces: Pieces::default(),
             };
             let mut rest = number;
             for i in (0..self.elements.len()).rev() {
@@ -139,7 +140,7 @@ impl Frame {
             let mut point = [0.0; super::WIDTH];
             (0..self.n).for_each(|j| point[self.n + j] = element.row[j]);
             point[self.width() - 1] = -element.speed;
-            (self.listed(&point), element.force)
+            (self.listed(&point), element.static_force)
         };
         self.elements.iter().map(row).collect()
     }

@@ -2,7 +2,7 @@
 
 use super::domain::{Functional, LinearDomain, Path};
 use super::frame::Frame;
-use super::modes::{GapMode, Modes};
+use super::modes::{GapMode, MOST_CURVES, Modes};
 use super::polynomial::{Fall, Polynomial, Weights, bernstein, first_fall};
 use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
@@ -29,6 +29,8 @@ pub(super) enum Watch {
     RateVanishes(usize),
     /// A holding force reaches its limit for sliding in a direction.
     Slips(usize, Slip),
+    /// The argument of a curve reaches the end of its piece, the upper one if true.
+    Border(usize, bool),
 }
 
 impl Watch {
@@ -42,7 +44,7 @@ impl Watch {
             | Watch::ForceEnds(gap, _)
             | Watch::ForceBegins(gap, _)
             | Watch::PushEnds(gap, _) => Some(gap),
-            Watch::RateVanishes(_) | Watch::Slips(..) => None,
+            Watch::RateVanishes(_) | Watch::Slips(..) | Watch::Border(..) => None,
         }
     }
 
@@ -61,6 +63,8 @@ pub(super) struct Roots {
     pub(super) from_force: [usize; MOST_GAPS],
     /// Orders of the roots of the sliding rates.
     pub(super) from_rate: [usize; MOST_FRICTION],
+    /// For an argument of a curve at a border of its pieces: whether the border is the upper one of its piece, and the order of the root.
+    pub(super) at_border: [Option<(bool, usize)>; MOST_CURVES],
 }
 
 /// The parts of a motion at an instant that watches depend on.
@@ -120,6 +124,17 @@ impl<'a> Moment<'a> {
                 _ => watches.push(Watch::RateVanishes(i)),
             }
         }
+        for (i, &piece) in self.modes.pieces.iter().enumerate() {
+            let spring = i.checked_sub(MOST_FRICTION).and_then(|spring| self.frame.springs.get(spring));
+            let wall = spring.and_then(|spring| spring.wall);
+            if let Some(curve) = self.frame.curve(i, &self.modes.slips)
+                && wall.is_none_or(|(gap, side)| self.frame.is_behind_last(self.modes, gap, side))
+            {
+                let ends = [(piece > 0, false), (usize::from(piece) < curve.borders.len(), true)];
+                watches
+                    .extend(ends.into_iter().filter(|end| end.0).map(|(_, upper)| Watch::Border(i, upper)));
+            }
+        }
     }
 
     /// Returns side and index of the wall that a gap in contact onset may reach when it moves away from its own wall.
@@ -154,7 +169,7 @@ impl<'a> Moment<'a> {
     /// Returns the function of a watch. It is positive before the root.
     pub(super) fn function(&self, watch: Watch) -> Functional {
         let (frame, domain, width) = (self.frame, self.domain, self.frame.width());
-        let force = |gap: usize, side: Side| frame.force(self.modes.stage, gap, side);
+        let force = |gap: usize, side: Side| frame.force(self.modes.stage, &self.modes.pieces, gap, side);
         match watch {
             Watch::Wall(..) | Watch::OnsetEnds(..) | Watch::Leaves(..) => {
                 let (gap, at, direction) = self.distance(watch).expect("it is a distance");
@@ -169,7 +184,13 @@ impl<'a> Moment<'a> {
             Watch::RateVanishes(i) => frame.rate_row(i).scaled(self.modes.slips[i].sign()),
             Watch::Slips(i, next) => {
                 let hold = domain.holds[i].as_ref().expect("the watch was listed");
-                hold.scaled(-next.sign()).plus(frame.elements[i].force, width)
+                hold.scaled(-next.sign()).plus(frame.elements[i].static_force, width)
+            }
+            Watch::Border(i, upper) => {
+                let (slips, sign) = (&self.modes.slips, if upper { 1.0 } else { -1.0 });
+                let border = usize::from(self.modes.pieces[i]) - usize::from(!upper);
+                let at = frame.curve(i, slips).expect("the watch was listed").borders[border];
+                frame.argument(i, slips).scaled(-sign).plus(sign * at, width)
             }
         }
     }
@@ -182,6 +203,9 @@ impl<'a> Moment<'a> {
                 self.roots.from_force[gap]
             }
             Watch::RateVanishes(i) => self.roots.from_rate[i],
+            Watch::Border(i, upper) if self.roots.at_border[i].is_some_and(|(at, _)| at == upper) => {
+                self.roots.at_border[i].map_or(0, |(_, order)| order)
+            }
             _ if row.vanishes(self.point) => self.domain.first_derivative(row, self.point, 0).0,
             _ => 0,
         }
@@ -250,7 +274,7 @@ impl<'a> Moment<'a> {
                     wall.contact.is_elastic() && wall.springs.iter().all(|spring| spring.preload == 0.0)
                 })
             }
-            Watch::Slips(..) => true,
+            Watch::Slips(..) | Watch::Border(..) => true,
             _ => false,
         }
     }

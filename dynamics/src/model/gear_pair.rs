@@ -67,6 +67,7 @@ impl GearPair {
             drives: vec![Drive { order: 1, cos: of(self.force, 0.0), sin: of(0.0, 0.0) }],
             gaps: vec![GapRow { row: of(1.0, -1.0), walls: [vec![wall(self.b)], vec![wall(-self.b)]] }],
             friction: Vec::new(),
+            springs: Vec::new(),
             signals: Vec::new(),
             timing: Timing::Forced,
         };

@@ -12,7 +12,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector, Matrix2, Matrix4, Vector2};
 
-use super::{Drive, Harmonic, Oscillator, Pair, REST, Side, State, is_semidefinite, state};
+use super::{Drive, DryFriction, Harmonic, Oscillator, Pair, REST, Side, State, is_semidefinite, state};
 
 /// Margin for rounding: of the distance to a wall, relative to twice the scale of length, and of the decay rate,
 /// relative to the excitation frequency.
@@ -95,9 +95,12 @@ impl NonImpacting {
     }
 
     /// Computes the contact-free steady motion of a machine. Returns none if it touches a wall or is not stable, or if the machine has
-    /// stages or dry friction. Coordinates on which no force acts between the walls must be at rest.
+    /// stages, dry friction or nonlinear springs. Coordinates on which no force acts between the walls must be at rest.
     pub fn of_machine(machine: &Oscillator) -> Option<NonImpacting> {
-        if !machine.schedule.is_empty() || machine.friction.iter().any(|friction| friction.force > 0.0) {
+        if !machine.schedule.is_empty()
+            || machine.friction.iter().any(DryFriction::acts)
+            || !machine.springs.is_empty()
+        {
             return None;
         }
         let n = machine.degrees();

@@ -28,6 +28,12 @@ pub const MOST_HARMONICS: usize = 7;
 /// Largest number of elements with dry friction.
 pub const MOST_FRICTION: usize = 2;
 
+/// Largest number of nonlinear springs.
+pub const MOST_SPRINGS: usize = 8;
+
+/// Largest number of pieces of a nonlinear spring, and of a friction force that depends on the sliding rate.
+pub const MOST_PIECES: usize = 66;
+
 /// Largest number of walls on a side.
 pub const MOST_WALLS: usize = 4;
 
@@ -162,16 +168,119 @@ pub struct GapRow {
 
 /// An element with dry friction along a row of velocities, by Coulomb's law.
 ///
-/// With the sliding rate `rate = row . v - speed`, the oscillator is subject to the generalised force `-row F`, where `F = force` for
-/// `rate > 0`, `F = -force` for `rate < 0`, and `|F| <= force` while the surfaces stick at `rate = 0`.
+/// With the sliding rate `rate = row . v - speed`, the oscillator is subject to the generalised force `-row F`, where `F = force(|rate|)` for
+/// `rate > 0`, `F = -force(|rate|)` for `rate < 0`, and `|F| <= static_force` while the surfaces stick at `rate = 0`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DryFriction {
     /// Row of the sliding rate; not zero.
     pub row: DVector<f64>,
-    /// Friction force, >= 0: the force while sliding, and the limit of the force while sticking.
+    /// Friction force just after sliding begins, >= 0.
     pub force: f64,
+    /// Further points of the friction force, at most [`MOST_PIECES`]` - 1`: sliding rates, positive and increasing, and forces, >= 0. The
+    /// force is linear between the points and constant beyond the last one.
+    pub at_speed: Vec<[f64; 2]>,
+    /// Largest force while the surfaces stick, at least `force`.
+    pub static_force: f64,
     /// Speed of the other surface along the row, for example of a moving belt.
     pub speed: f64,
+}
+
+impl DryFriction {
+    /// Returns friction by Coulomb's law: the same force at all sliding rates and at rest.
+    pub fn new(row: DVector<f64>, force: f64, speed: f64) -> DryFriction {
+        DryFriction { row, force, at_speed: Vec::new(), static_force: force, speed }
+    }
+
+    /// Whether the force is the same at all sliding rates and at rest.
+    pub fn is_constant(&self) -> bool {
+        self.at_speed.is_empty() && self.static_force == self.force
+    }
+
+    /// Whether the friction ever has a force.
+    pub fn acts(&self) -> bool {
+        self.static_force > 0.0 || self.at_speed.iter().any(|point| point[1] > 0.0)
+    }
+
+    /// Returns the force as a function of the modulus of the sliding rate.
+    pub fn curve(&self) -> Curve {
+        let last = self.at_speed.last().map_or(self.force, |point| point[1]);
+        Curve::new([0.0, self.force], &self.at_speed, [0.0, last])
+    }
+}
+
+/// A nonlinear spring along a row of displacements: the oscillator is subject to the generalised force `-row force(row . x)`. The force is
+/// linear between the points. Beyond them the first and the last piece go on, and the status is `out_of_range`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NonlinearSpring {
+    /// Row of the elongation; not zero.
+    pub row: DVector<f64>,
+    /// Elongations, increasing, and forces; 2 to [`MOST_PIECES`]` - 1` points.
+    pub points: Vec<[f64; 2]>,
+    /// The gap and side whose last wall the spring belongs to: it acts only while this wall does, from the first point on.
+    pub wall: Option<(usize, Side)>,
+}
+
+impl NonlinearSpring {
+    /// Whether the opposite elongation has the opposite force.
+    pub fn is_odd(&self) -> bool {
+        let opposite = |(a, b): (&[f64; 2], &[f64; 2])| a[0] == -b[0] && a[1] == -b[1];
+        self.points.iter().zip(self.points.iter().rev()).all(opposite)
+    }
+
+    /// Returns the force as a function of the elongation. Its last border is the end of the range, and its first one, without a wall.
+    pub fn curve(&self) -> Curve {
+        let slope = |[a, b]: [[f64; 2]; 2]| (b[1] - a[1]) / (b[0] - a[0]);
+        let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
+        let [below, above] =
+            [slope([first, self.points[1]]), slope([self.points[self.points.len() - 2], last])];
+        let mut curve = Curve::new(first, &self.points[1..], [above, last[1] - above * last[0]]);
+        if self.wall.is_none() {
+            curve.borders.insert(0, first[0]);
+            curve.pieces.insert(0, [below, first[1] - below * first[0]]);
+        }
+        curve
+    }
+}
+
+/// A continuous, piecewise linear function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Arguments at which a piece ends and the next one begins, increasing.
+    pub borders: Vec<f64>,
+    /// For each piece, the slope and the value that its line has at the argument 0.
+    pub pieces: Vec<[f64; 2]>,
+}
+
+impl Curve {
+    /// Returns the function through a first point and further points, with the line `last` beyond them.
+    fn new(first: [f64; 2], further: &[[f64; 2]], last: [f64; 2]) -> Curve {
+        let mut before = first;
+        let piece = |&[at, value]: &[f64; 2]| {
+            let slope = (value - before[1]) / (at - before[0]);
+            before = [at, value];
+            [slope, value - slope * at]
+        };
+        let pieces = further.iter().map(piece).chain([last]).collect();
+        Curve { borders: further.iter().map(|point| point[0]).collect(), pieces }
+    }
+
+    /// Returns the number of the piece at an argument.
+    pub fn piece(&self, argument: f64) -> usize {
+        self.borders.iter().filter(|border| **border < argument).count()
+    }
+
+    /// Returns the integral from one argument to another.
+    pub fn integral(&self, from: f64, to: f64) -> f64 {
+        let between = self.borders.iter().copied().filter(|border| (from..to).contains(border));
+        let ends: Vec<f64> = [from].into_iter().chain(between).chain([to]).collect();
+        ends.windows(2).map(|ends| (ends[1] - ends[0]) * self.at(0.5 * (ends[0] + ends[1]))).sum()
+    }
+
+    /// Returns the value at an argument.
+    pub fn at(&self, argument: f64) -> f64 {
+        let [slope, value] = self.pieces[self.piece(argument)];
+        value + slope * argument
+    }
 }
 
 /// A linear function of the motion that is measured, such as the acceleration of a seat on a moving support:
@@ -230,6 +339,8 @@ pub struct Oscillator {
     pub gaps: Vec<GapRow>,
     /// Elements with dry friction, up to [`MOST_FRICTION`].
     pub friction: Vec<DryFriction>,
+    /// Nonlinear springs, up to [`MOST_SPRINGS`].
+    pub springs: Vec<NonlinearSpring>,
     /// Signals, up to [`MOST_SIGNALS`].
     pub signals: Vec<Signal>,
     /// What `omega` means.
@@ -258,6 +369,7 @@ impl Oscillator {
             (self.degrees() > 2, "more than two coordinates"),
             (self.gaps.len() > 1, "several gaps"),
             (!self.friction.is_empty(), "dry friction"),
+            (!self.springs.is_empty(), "nonlinear springs"),
             (!self.signals.is_empty(), "signals"),
             (self.timing != Timing::Forced, "no force, harmonics or stages"),
             (
@@ -300,10 +412,27 @@ impl Oscillator {
         }
     }
 
+    /// Whether the springs of each gap's walls are alike on both sides.
+    fn has_odd_wall_springs(&self) -> bool {
+        let of = |gap: usize, side: Side| {
+            self.springs.iter().find(move |spring| spring.wall == Some((gap, side))).map(|one| &one.points)
+        };
+        (0..self.gaps.len()).all(|gap| of(gap, Side::Right) == of(gap, Side::Left))
+    }
+
+    /// Returns the stiffness in a stage, with that of nonlinear springs at rest.
+    pub(crate) fn stiffness_at_rest(&self, stage: usize) -> DMatrix<f64> {
+        let free = self.springs.iter().filter(|spring| spring.wall.is_none());
+        free.fold(self.stages[stage].stiffness.clone(), |sum, spring| {
+            let curve = spring.curve();
+            sum + &spring.row * spring.row.transpose() * curve.pieces[curve.piece(0.0)][0]
+        })
+    }
+
     /// Returns the lowest frequency of undamped free motion in the first stage, without rigid-body modes; none if no stiffness acts.
     pub fn slowest_natural_frequency(&self) -> Option<f64> {
         let root = self.mass.clone().cholesky()?.l().try_inverse()?;
-        let squares = (&root * &self.stages[0].stiffness * root.transpose()).symmetric_eigenvalues();
+        let squares = (&root * self.stiffness_at_rest(0) * root.transpose()).symmetric_eigenvalues();
         let least = MATRIX_TOLERANCE * squares.amax();
         squares.iter().filter(|&&square| square > least).map(|square| square.sqrt()).reduce(f64::min)
     }
@@ -464,6 +593,8 @@ impl Oscillator {
             && pairs().all(is_alike)
             && self.drives.iter().all(|drive| drive.order % 2 == 1)
             && self.friction.iter().all(|friction| friction.speed == 0.0)
+            && self.springs.iter().all(|spring| spring.wall.is_some() || spring.is_odd())
+            && self.has_odd_wall_springs()
             && self.signals.iter().all(|signal| signal.constant == 0.0)
             && recurs_after_half_a_period(&self.schedule, is_mirrored)
     }
@@ -571,11 +702,27 @@ impl Oscillator {
             "independence of the rows of the gaps",
             "above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap",
         )?;
-        for (i, DryFriction { row, force, speed }) in (1..).zip(&self.friction) {
+        for (i, DryFriction { row, force, at_speed, static_force, speed }) in (1..).zip(&self.friction) {
             let name = |what: &'static str| move || format!("{what} of friction {i}");
             all_finite(name("row"), row)?;
-            require(force.is_finite() && *force >= 0.0, name("force"), *force, "finite and at least 0")?;
+            let forces = [*force].into_iter().chain(at_speed.iter().map(|point| point[1]));
+            for force in forces {
+                require(force.is_finite() && force >= 0.0, name("force"), force, "finite and at least 0")?;
+            }
+            let range = "finite and at least the force while sliding begins";
+            require(static_force.is_finite() && static_force >= force, name("static"), *static_force, range)?;
+            increasing(name("sliding rate"), [0.0].into_iter().chain(at_speed.iter().map(|point| point[0])))?;
             finite(name("speed"), *speed)?;
+        }
+        let springs = self.springs.len();
+        let most = "at most 8, with those of walls";
+        require(springs <= MOST_SPRINGS, || "nonlinear springs".to_owned(), springs as f64, most)?;
+        for (i, NonlinearSpring { row, points, .. }) in (1..).zip(&self.springs) {
+            let name = |what: &'static str| move || format!("{what} of nonlinear spring {i}");
+            all_finite(name("row"), row)?;
+            require(row.amax() > 0.0, name("row"), 0.0, "not 0")?;
+            all_finite(name("force"), points.iter().map(|point| &point[1]))?;
+            increasing(name("elongation"), points.iter().map(|point| point[0]))?;
         }
         if elements == 2 && n == 2 {
             let last = self.gaps.iter().flat_map(|gap| gap.walls.iter().filter_map(|walls| walls.last()));
@@ -700,8 +847,8 @@ impl Oscillator {
     /// Returns the largest deflection by each force, in all stages.
     fn deflections(&self) -> Vec<f64> {
         let mut found = Vec::new();
-        for Forces { stiffness, load, .. } in &self.stages {
-            let eigen = stiffness.clone().symmetric_eigen();
+        for (stage, Forces { load, .. }) in self.stages.iter().enumerate() {
+            let eigen = self.stiffness_at_rest(stage).symmetric_eigen();
             let size = &eigen.eigenvectors
                 * DMatrix::from_diagonal(&eigen.eigenvalues.abs())
                 * eigen.eigenvectors.transpose();
@@ -715,7 +862,7 @@ impl Oscillator {
                 under(drive.cos.clone(), drive.order);
                 under(drive.sin.clone(), drive.order);
             });
-            self.friction.iter().for_each(|friction| under(&friction.row * friction.force, 1));
+            self.friction.iter().for_each(|friction| under(&friction.row * friction.static_force, 1));
             for gap in &self.gaps {
                 let springs = gap.walls.iter().flatten().flat_map(|wall| &wall.springs);
                 springs
@@ -725,6 +872,19 @@ impl Oscillator {
         }
         found
     }
+}
+
+/// Checks that values are finite and increase.
+fn increasing(
+    name: impl Fn() -> String,
+    values: impl IntoIterator<Item = f64>,
+) -> Result<(), OscillatorError> {
+    let mut before = f64::NEG_INFINITY;
+    values.into_iter().try_for_each(|value| {
+        let is_above = value.is_finite() && value > before;
+        before = value;
+        require(is_above, &name, value, "finite and above the one before it")
+    })
 }
 
 const POSITIVE: &str = "greater than 0";

@@ -644,7 +644,7 @@ mod tests {
         let pair = GearPair::paper(0.5).oscillator().unwrap();
         assert!(pair.needs_machine().is_none());
         let row = pair.gaps[0].row.clone();
-        let friction = vec![DryFriction { row, force: 0.0, speed: 0.0 }];
+        let friction = vec![DryFriction::new(row, 0.0, 0.0)];
         let mut rubbing = Oscillator { friction, ..pair.clone() };
         assert_eq!((Pair::of(&rubbing), rubbing.needs_machine()), (None, Some("dry friction")));
         rubbing.friction.clear();

@@ -44,7 +44,7 @@ pub struct RigidModes {
 struct Description<'a> {
     /// Stiffness and damping of each stage.
     stages: Vec<[DMatrix<f64>; 2]>,
-    /// Rows of gaps and friction.
+    /// Rows of gaps and nonlinear springs, and of friction.
     gaps: Vec<DVector<f64>>,
     friction: Vec<DVector<f64>>,
     /// Load of each stage.
@@ -102,9 +102,10 @@ impl Oscillator {
     /// Returns the rigid-body modes.
     pub fn rigid_modes(&self) -> RigidModes {
         let of_stage = |forces: &Forces| [forces.stiffness.clone(), forces.damping.clone()];
+        let gaps = self.gaps.iter().map(|gap| gap.row.clone());
         let description = Description {
             stages: self.stages.iter().map(of_stage).collect(),
-            gaps: self.gaps.iter().map(|gap| gap.row.clone()).collect(),
+            gaps: gaps.chain(self.springs.iter().map(|spring| spring.row.clone())).collect(),
             friction: self.friction.iter().map(|friction| friction.row.clone()).collect(),
             loads: self.stages.iter().map(|forces| forces.load.clone()).collect(),
             schedule: &self.schedule,

@@ -51,6 +51,7 @@ impl Stops {
             drives: vec![Drive { order: 1, cos: row(self.force), sin: row(0.0) }],
             gaps: vec![GapRow { row: row(1.0), walls: [vec![wall(self.b)], vec![wall(-self.b)]] }],
             friction: Vec::new(),
+            springs: Vec::new(),
             signals: Vec::new(),
             timing: Timing::Forced,
         };

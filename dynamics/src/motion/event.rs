@@ -167,6 +167,16 @@ impl Observer for Vec<GapEvent> {
         self.push(*event);
     }
 }
+
+/// What makes a motion doubtful, in increasing order of rank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Remark {
+    /// A nonlinear spring was deformed beyond the range of its points.
+    OutOfRange,
+    /// Two gaps reached their walls at the same time, so that their order in the model decided the motion.
+    Tie,
+}
+
 /// Counters of the work of a trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {

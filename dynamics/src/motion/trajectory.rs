@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Allowance, Engine, Flow, GapEvent, Observer, Stop, Sums, Work};
+use super::{Allowance, Engine, Flow, GapEvent, Observer, Remark, Stop, Sums, Work};
 use crate::machine::{MachineMotion, System};
 use crate::model::{Law, MOST_COORDINATES, REST, Side, State, first_four, state};
 use crate::pair::{PairMeter, PairMotion};
@@ -281,9 +281,12 @@ impl<'f, const N: usize> Trajectory<'f, N> {
         }
     }
 
-    /// Whether two gaps have reached their walls at the same time since the start, so that their order in the model decided the motion.
-    pub(crate) fn is_tied(&self) -> bool {
-        matches!(&self.motion, Engines::Machine(motion) if motion.is_tied())
+    /// Returns what makes the motion since the start doubtful.
+    pub(crate) fn remark(&self) -> Option<Remark> {
+        match &self.motion {
+            Engines::Pair(_) => None,
+            Engines::Machine(motion) => motion.remark(),
+        }
     }
 
     /// Whether any event was so near to grazing that the linearisation is not reliable.

@@ -670,8 +670,8 @@ impl Analysis<'_> {
         cycle: &Cycle,
         distance: f64,
     ) -> Result<Orbit, Stop> {
-        let status = if seed.is_tied() || reading.is_tied {
-            Status::Simultaneous
+        let status = if let Some(remark) = seed.remark().max(reading.remark) {
+            remark.into()
         } else if reading.near_grazing || cycle.near_grazing {
             Status::NearGrazing
         } else if reading.on_strobe {
@@ -746,10 +746,10 @@ impl Analysis<'_> {
         let reading = Reading::take(self.flow, &mut trajectory, self.event_periods, false)?;
         Ok(Orbit {
             class,
-            status: match status {
-                Status::Ok if reading.is_tied => Status::Simultaneous,
-                Status::Ok if reading.on_strobe => Status::StrobeOnEvent,
-                status => status,
+            status: match (status, reading.remark) {
+                (Status::Ok, Some(remark)) => remark.into(),
+                (Status::Ok, None) if reading.on_strobe => Status::StrobeOnEvent,
+                (status, _) => status,
             },
             lyapunov: window.lyapunov,
             lyapunov_error: Some(window.lyapunov_error),

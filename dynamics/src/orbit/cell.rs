@@ -21,7 +21,7 @@ use super::search_filter::{SearchHistory, contraction, escapes, exceeds_stretch}
 use super::{Budget, Class, Orbit, Section, Status};
 use crate::model::{Law, State, Timing};
 use crate::motion::Flow;
-use crate::motion::{Allowance, Stop, Trajectory, share};
+use crate::motion::{Allowance, Remark, Stop, Trajectory, share};
 use crate::stability::{Cycle, Exponent, FRESH_TANGENT, Newton};
 use crate::word::Word;
 
@@ -90,7 +90,8 @@ pub struct Measurement {
 impl Measurement {
     /// Whether aperiodic motion is certainly chaotic or quasi-periodic.
     fn is_decided(&self) -> bool {
-        matches!(self.status, Status::Ok | Status::Simultaneous) && self.lyapunov.is_some()
+        matches!(self.status, Status::Ok | Status::Simultaneous | Status::OutOfRange)
+            && self.lyapunov.is_some()
     }
 
     /// Whether aperiodic motion is certainly chaotic.
@@ -186,7 +187,7 @@ fn measure_by_strobes(
         approaches_free: false,
         is_neutral: false,
         is_on_unstable: false,
-        is_tied: false,
+        remark: None,
         counts: vec![[0.0; 3]],
         itineraries: Vec::new(),
         rests: Vec::new(),
@@ -242,7 +243,7 @@ struct CellRun<'a> {
     /// Whether the motion lies on an unstable cycle when its budget ends.
     is_on_unstable: bool,
     /// Whether the order of two gaps has decided the motion.
-    is_tied: bool,
+    remark: Option<Remark>,
     /// Impacts and meshing time up to each strobe.
     counts: Vec<[f64; 3]>,
     /// Itinerary of each period.
@@ -301,7 +302,7 @@ impl<'a> CellRun<'a> {
         self.itineraries.push(recorder.itinerary);
         self.near_strobe = self.near_strobe << 1 | u16::from(recorder.is_near_strobe);
         self.exponent.renormalise(trajectory);
-        self.is_tied = trajectory.is_tied();
+        self.remark = trajectory.remark();
         self.strobes.push(trajectory.state());
         let now = self.strobes.len() as u32 - 1;
         if self.exponent.vanished() {
@@ -643,8 +644,7 @@ impl<'a> CellRun<'a> {
             true if self.is_on_unstable => Status::UnstableCycle,
             true if self.is_neutral => Status::Neutral,
             true => Status::Slow,
-            false if self.is_tied => Status::Simultaneous,
-            false => Status::Ok,
+            false => self.remark.map_or(Status::Ok, Status::from),
         };
         Measurement {
             is_quasi_periodic,
@@ -652,8 +652,7 @@ impl<'a> CellRun<'a> {
             impacts_per_period: impacts / span,
             mesh_fraction: share(meshing_time, span * period),
             ..self.without_results(match is_quasi_periodic {
-                true if self.is_tied => Status::Simultaneous,
-                true => Status::Ok,
+                true => self.remark.map_or(Status::Ok, Status::from),
                 false => status,
             })
         }

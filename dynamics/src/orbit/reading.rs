@@ -4,7 +4,9 @@ use super::itinerary::{Itinerary, Recorder};
 use super::quantities::{Meter, Quantities};
 use super::{Event, SlipPoint};
 use crate::model::{Side, State};
-use crate::motion::{EventKind, Flow, GapEvent, Observer, SlipEvent, States, Stop, Sums, Trajectory, share};
+use crate::motion::{
+    EventKind, Flow, GapEvent, Observer, Remark, SlipEvent, States, Stop, Sums, Trajectory, share,
+};
 use crate::word::Word;
 
 /// Largest distance from phase 0, in turns, of an event that lies on the strobe.
@@ -27,7 +29,7 @@ pub(super) struct Reading {
     /// Whether the motion ends in the domain in which it started. The state alone may recur in another domain.
     pub(super) closes: bool,
     pub(super) near_grazing: bool,
-    pub(super) is_tied: bool,
+    pub(super) remark: Option<Remark>,
     pub(super) on_strobe: bool,
 }
 
@@ -71,7 +73,7 @@ impl Reading {
             itineraries: recorders.into_iter().map(|recorder| recorder.itinerary).collect(),
             closes: trajectory.is_in_domain_of(&first),
             near_grazing: trajectory.near_grazing(),
-            is_tied: trajectory.is_tied(),
+            remark: trajectory.remark(),
             // Rounding may put an event at phase 0 outside the cycle.
             on_strobe: [&first, &*trajectory]
                 .into_iter()

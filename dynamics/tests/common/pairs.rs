@@ -89,11 +89,8 @@ impl Rubbing {
     /// Describes the pair and its friction, with a law of restitution.
     pub(crate) fn described(&self, law: Law) -> Oscillator {
         let n = self.pair.degrees;
-        let element = |one: &Friction| DryFriction {
-            row: DVector::from_row_slice(&one.row[..n]),
-            force: one.force,
-            speed: one.speed,
-        };
+        let element =
+            |one: &Friction| DryFriction::new(DVector::from_row_slice(&one.row[..n]), one.force, one.speed);
         let friction = self.friction.iter().map(element).collect();
         Oscillator { friction, ..described(&self.pair, law) }
     }
@@ -183,6 +180,7 @@ pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
             .collect(),
         gaps: vec![GapRow { row: vector(pair.gap), walls: Side::BOTH.map(walls) }],
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }

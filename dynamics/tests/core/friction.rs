@@ -79,7 +79,8 @@ fn friction_as_large_as_the_force_holds_a_chain_of_masses() {
             schedule: Vec::new(),
             drives: vec![Drive { order: 1, cos: along(0.4), sin: along(0.0) }],
             gaps: vec![GapRow { row: along(1.0), walls: Default::default() }],
-            friction: vec![DryFriction { row: along(1.0), force: 1.0, speed: 0.0 }],
+            friction: vec![DryFriction::new(along(1.0), 1.0, 0.0)],
+            springs: Vec::new(),
             signals: Vec::new(),
         };
         let (flow, mut slides) = (Flow::new(Form::Machine(chain)), Slides::default());

@@ -102,7 +102,7 @@ const UNSYMMETRIC: [Change; 7] = [
     },
     |machine| {
         let row = DVector::from_vec(vec![1.0, 0.0]);
-        machine.friction.push(DryFriction { row, force: 0.1, speed: 0.2 });
+        machine.friction.push(DryFriction::new(row, 0.1, 0.2));
     },
 ];
 
@@ -207,6 +207,7 @@ fn bar(inertia: f64) -> Oscillator {
         drives: vec![Drive { order: 1, cos: vector(&[2.0, 0.0]), sin: vector(&[0.0, 0.0]) }],
         gaps: [-1.0, 1.0].map(end).into(),
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
     }
 }

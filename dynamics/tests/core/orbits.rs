@@ -327,7 +327,8 @@ fn a_machine_that_is_too_stiff_says_so_at_once() {
         schedule: Vec::new(),
         drives: vec![Drive { order: 1, cos: unit(), sin: DVector::zeros(8) }],
         gaps: vec![GapRow { row: unit(), walls: Default::default() }],
-        friction: vec![DryFriction { row: unit(), force: 0.1, speed: 0.0 }],
+        friction: vec![DryFriction::new(unit(), 0.1, 0.0)],
+        springs: Vec::new(),
         signals: Vec::new(),
     };
     let (flow, law) = (Flow::new(Form::Machine(machine)), Law::both(0.0, 0.0));

@@ -18,7 +18,10 @@ use super::dop853::Integration;
 use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, REST, Side, State};
 use rattlemap_dynamics::motion::EventKind;
 
-use system::{Constraints, Domain, Functional, Key, Numbers, PhasePoint, Slide, System, affine, dot, size};
+use system::{
+    CURVES, Constraints, Domain, Functional, Key, Numbers, PhasePoint, Pieces, Slide, System, affine, dot,
+    size,
+};
 
 /// Relative and absolute tolerance of one step.
 const TOLERANCE: f64 = 1e-12;
@@ -59,6 +62,8 @@ enum Ending {
     RateVanishes(usize),
     /// The force that holds an element reaches its limit.
     Slips(usize, Slide),
+    /// The argument of a curve reaches the upper or the lower end of its piece. This does not count as an event.
+    Bends(usize, bool),
 }
 
 /// A function that falls below 0 at an ending.
@@ -171,6 +176,9 @@ pub struct Flight {
     slides: [Slide; MOST_FRICTION],
     /// Orders of the roots of sliding rates at the start of the flight; 0 without a root.
     from_rate: [usize; MOST_FRICTION],
+    pieces: Pieces,
+    /// Ends of pieces at which arguments of curves lie, and the orders of the roots.
+    at_end: [Option<(bool, usize)>; CURVES],
     y: Numbers,
     /// Tally of the time since the caller last took it.
     pub(super) tally: Tally,
@@ -197,6 +205,8 @@ impl Flight {
             gaps: [gap; MOST_GAPS],
             slides: [Slide::Sticks; MOST_FRICTION],
             from_rate: [0; MOST_FRICTION],
+            pieces: Pieces::default(),
+            at_end: [None; CURVES],
             y: system.to_coordinates(&machine.put_on_walls(start)),
             tally: Tally::default(),
             events: Vec::new(),
@@ -276,6 +286,7 @@ impl Flight {
                 _ => None,
             }),
             slides: self.slides,
+            pieces: self.pieces,
         }
     }
 
@@ -307,7 +318,7 @@ impl Flight {
         let level = self.gaps[gap].level;
         let side = side_of(level);
         let is_last = level != 0 && usize::from(level.unsigned_abs()) == self.system.walls(gap, side).len();
-        if is_last { self.system.pushing(gap, side, self.stage) } else { None }
+        if is_last { self.system.pushing(gap, side, self.stage, &self.pieces) } else { None }
     }
 
     /// Lists the functions that may end the present modes.
@@ -361,7 +372,7 @@ impl Flight {
             match (self.slides[i], &domain.holds[i]) {
                 (Slide::Sticks, Some(hold)) => {
                     for next in [Slide::Forwards, Slide::Backwards] {
-                        let room = affine(hold, -next.sign(), element.force, width);
+                        let room = affine(hold, -next.sign(), element.static_force, width);
                         add(Ending::Slips(i, next), room, 0);
                     }
                 }
@@ -370,6 +381,16 @@ impl Flight {
                     let rate = affine(&system.sliding_rate(i), slide.sign(), 0.0, width);
                     add(Ending::RateVanishes(i), rate, self.from_rate[i]);
                 }
+            }
+        }
+        for i in 0..CURVES {
+            let Some((force, row)) = system.bent(i, &self.slides) else { continue };
+            let piece = usize::from(self.pieces[i]);
+            for (is_upper, border) in [(false, piece.wrapping_sub(1)), (true, piece)] {
+                let Some(at) = force.borders.get(border) else { continue };
+                let sign = if is_upper { -1.0 } else { 1.0 };
+                let order = self.at_end[i].filter(|end| end.0 == is_upper).map_or(0, |end| end.1);
+                add(Ending::Bends(i, is_upper), affine(&row, sign, -sign * at, width), order);
             }
         }
         watches
@@ -471,6 +492,7 @@ impl Flight {
             self.gaps[gap].from_force = 0;
         }
         self.from_rate = [0; MOST_FRICTION];
+        self.at_end = [None; CURVES];
     }
 }
 

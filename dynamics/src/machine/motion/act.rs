@@ -6,9 +6,10 @@ use crate::machine::domain::STAYS_ZERO;
 use crate::machine::impact::{Impact, Outcome};
 use crate::machine::modes::{AtRest, GapMode, signed};
 use crate::machine::watch::Watch;
-use crate::model::{Side, Wall};
+use crate::model::{MOST_FRICTION, Side, Wall};
 use crate::motion::{
-    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, SlipEvent, SlipKind, Slips,
+    EVENTS_PER_PERIOD_CAP, EventKind, GRAZING_SPEED, GapEvent, NO_SPEED, Observer, Remark, SlipEvent,
+    SlipKind, Slips,
 };
 use crate::word;
 
@@ -61,6 +62,7 @@ impl MachineMotion<'_> {
                 self.roots.at_wall[gap] = Some((side, RELEASE_ORDER));
                 exempt.gaps[gap] = Some(side);
             }
+            Watch::Border(i, is_upper) => return self.pass_border(i, is_upper),
             Watch::RateVanishes(i) => self.end_sliding(i, observer),
             Watch::Slips(i, next) => {
                 self.begin_sliding(i, next, observer);
@@ -75,6 +77,30 @@ impl MachineMotion<'_> {
         }
     }
 
+    /// Enters the next piece of a curve at a border. Its force is continuous, so that this is no event.
+    pub(super) fn pass_border(&mut self, i: usize, is_upper: bool) {
+        let inside = self.moment().function(Watch::Border(i, is_upper));
+        let (order, value) = self.domain.first_derivative(&inside, &self.point, 1);
+        if value < 0.0 {
+            let piece = &mut self.modes.pieces[i];
+            *piece = if is_upper { *piece + 1 } else { *piece - 1 };
+            self.roots.at_border[i] = Some((!is_upper, order));
+            self.check_range(i);
+            self.refresh();
+        } else {
+            self.roots.at_border[i] = Some((is_upper, order));
+        }
+    }
+
+    /// Notes it if a nonlinear spring is beyond its points.
+    pub(super) fn check_range(&mut self, i: usize) {
+        let spring = i.checked_sub(MOST_FRICTION).map(|spring| &self.system.springs[spring]);
+        let is_beyond = |piece: usize, pieces: usize| piece == 0 || piece + 1 == pieces;
+        if spring.is_some_and(|own| is_beyond(self.modes.pieces[i].into(), own.curve.pieces.len())) {
+            self.remark = self.remark.max(Some(Remark::OutOfRange));
+        }
+    }
+
     /// Begins contact with a wall that only pushes, whose force is 0 now.
     pub(super) fn begin_force(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
         let count = self.system.walls(gap, side).len();
@@ -85,7 +111,7 @@ impl MachineMotion<'_> {
 
     /// Returns order and value of the first nonzero derivative of a pushing wall's force, like `LinearDomain::first_derivative`.
     pub(super) fn derivative_of_force(&mut self, gap: usize, side: Side, first: usize) -> (usize, f64) {
-        let force = self.system.force(self.modes.stage, gap, side);
+        let force = self.system.force(self.modes.stage, &self.modes.pieces, gap, side);
         self.refresh().first_derivative(&force, &self.point, first)
     }
 
@@ -172,7 +198,9 @@ impl MachineMotion<'_> {
     /// Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
     fn impact(&mut self, gap: usize, side: Side, wall: &Wall, observer: &mut dyn Observer) {
         let (system, approach) = (self.system, side.sign() * self.rate(gap));
-        self.is_tied |= (0..system.gaps()).any(|other| other != gap && self.arrives_with(gap, other));
+        if (0..system.gaps()).any(|other| other != gap && self.arrives_with(gap, other)) {
+            self.remark = Some(Remark::Tie);
+        }
         let (modes, point) = (&self.modes, &self.point);
         let impact = Impact { system, modes, point, gap, side, wall, approach };
         let Outcome { modes: next, point, lasts, pressing, jump } = impact.outcome();

@@ -111,6 +111,9 @@ impl<'s> MachineMotion<'s> {
             let along: f64 = element.row.iter().zip(&kick).map(|(row, kick)| row * kick).sum();
             let [rate, size] = element.rate_and_size(&stopped[n..]);
             if rate.abs() <= ROUNDING * size && modes.slips[i] != Slip::Stick {
+                if self.sticks_in_flight(i, &stopped) {
+                    return None;
+                }
                 (series.held.slips[i], series.back[i]) = (Slip::Stick, modes.slips[i].reversed());
             } else if along.abs() > ROUNDING * element.row.amax() && rate.abs() <= 2.0 * along.abs() * speed {
                 return None;
@@ -133,6 +136,15 @@ impl<'s> MachineMotion<'s> {
         series.rest.damping = -(0..n).map(|i| row.0[n + i] * kick[i]).sum::<f64>();
         series.time = series.rest.duration(speed, 0.0);
         (series.time < self.clock.remaining(self.goal).min(series.at_rest.unit)).then_some(series)
+    }
+
+    /// Whether an element that slides along the gap of a series sticks where its rate vanishes, because it is larger at rest than sliding.
+    fn sticks_in_flight(&self, i: usize, stopped: &PhasePoint) -> bool {
+        let (element, mut modes) = (&self.system.elements[i], self.modes);
+        modes.slips[i] = Slip::Stick;
+        let holds = &self.system.domain(&modes).holds[i];
+        element.static_force > element.curve.at(0.0)
+            && holds.as_ref().is_some_and(|hold| hold.dot(stopped).abs() <= element.static_force)
     }
 
     /// Replaces the rest of a series of impacts by its limit if the rest is short. The gap has just left its wall. Meanwhile everything

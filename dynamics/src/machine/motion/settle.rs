@@ -3,7 +3,7 @@
 use super::MachineMotion;
 use super::act::RELEASE_ORDER;
 use crate::machine::domain::DomainKey;
-use crate::machine::modes::{AtRest, GapMode, Modes};
+use crate::machine::modes::{AtRest, GapMode, MOST_CURVES, Modes};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
 use crate::motion::{EventKind, Observer, SlipKind, Sums};
@@ -40,15 +40,20 @@ impl MachineMotion<'_> {
         let kept: [bool; MOST_GAPS] =
             std::array::from_fn(|gap| gap < system.gaps() && self.moment().is_kept(gap));
         let before = self.modes;
-        self.modes.slips[i] = next;
+        (self.modes.slips[i], self.modes.pieces[i]) = (next, 0);
         let domain = self.refresh();
+        // The accelerations jump if friction is larger at rest than while sliding.
+        let element = &system.elements[i];
+        let jumps = element.static_force > element.curve.at(0.0);
+        let release_order = if jumps { RELEASE_ORDER - 1 } else { RELEASE_ORDER };
         let freed = || (0..system.gaps()).filter(|&gap| kept[gap] && !domain.is_still[gap]);
         for gap in freed() {
             if let (Some((side, _)), GapMode::Beyond(_)) = (self.roots.at_wall[gap], self.modes.gaps[gap])
                 && let Some((own, number)) = self.system.wall_ahead(&self.modes, gap, side)
                 && own == side
                 && self.system.walls(gap, side)[number].contact == Contact::Rigid
-                && side.sign() * domain.first_derivative(&domain.unit_row(gap), &self.point, 3).1 > 0.0
+                && side.sign() * domain.first_derivative(&domain.unit_row(gap), &self.point, release_order).1
+                    > 0.0
             {
                 // The wall holds the gap from here on.
                 self.modes = before;
@@ -58,13 +63,13 @@ impl MachineMotion<'_> {
                 return;
             }
         }
-        self.roots.from_rate[i] = 2;
+        self.roots.from_rate[i] = if jumps { 1 } else { 2 };
         self.has_slid[i] = true;
         self.record_slip(i, SlipKind::Slip, observer);
         for gap in freed() {
-            self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|(side, _)| (side, RELEASE_ORDER));
+            self.roots.at_wall[gap] = self.roots.at_wall[gap].map(|(side, _)| (side, release_order));
             if let GapMode::Onset(_) = self.modes.gaps[gap] {
-                self.roots.from_force[gap] = 1;
+                self.roots.from_force[gap] = release_order - 2;
             }
         }
     }
@@ -202,6 +207,8 @@ impl MachineMotion<'_> {
     /// Enters new modes of friction and reports the changes.
     fn change_slips(&mut self, next: &Modes, stopped: Option<usize>, observer: &mut dyn Observer) {
         let before = std::mem::replace(&mut self.modes.slips, next.slips);
+        self.modes.pieces = next.pieces;
+        self.roots.at_border = [None; MOST_CURVES];
         for (i, (before, after)) in
             before.into_iter().zip(next.slips).enumerate().take(self.system.elements.len())
         {
@@ -249,8 +256,8 @@ impl MachineMotion<'_> {
             }
             // Only contact with the outermost wall depends on its force.
             let side = if from + to > 0 { Side::Right } else { Side::Left };
-            let wall = system.last_wall(gap, side);
-            let stored = |stage: usize| wall.stored(stage, side, self.point[gap]);
+            let (wall, last) = (system.last_wall(gap, side), system.walls(gap, side).len() - 1);
+            let stored = |stage: usize| system.stored(stage, gap, side, last, self.point[gap]);
             let [held, holds] =
                 if from.abs() > to.abs() { [stored(before.stage), 0.0] } else { [0.0, stored(after.stage)] };
             if wall.contact == Contact::Pushing {

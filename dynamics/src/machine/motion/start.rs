@@ -2,7 +2,7 @@
 
 use super::MachineMotion;
 use crate::machine::domain::Carrier;
-use crate::machine::modes::{AtRest, GapMode, Modes, signed};
+use crate::machine::modes::{AtRest, GapMode, Modes, Pieces, signed};
 use crate::machine::watch::Roots;
 use crate::machine::{Numbers, System};
 use crate::model::{Contact, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
@@ -19,7 +19,12 @@ impl<'s> MachineMotion<'s> {
     /// [`put_on_walls`](crate::model::Oscillator::put_on_walls).
     pub fn new(system: &'s System, state: &[f64]) -> MachineMotion<'s> {
         let stage = system.machine.first_stage();
-        let modes = Modes { stage, gaps: [GapMode::Beyond(0); MOST_GAPS], slips: Slips::default() };
+        let modes = Modes {
+            stage,
+            gaps: [GapMode::Beyond(0); MOST_GAPS],
+            slips: Slips::default(),
+            pieces: Pieces::default(),
+        };
         let begins_now = system.schedule.first().is_some_and(|change| change.0 == 0.0);
         let point = system.point(&system.to_flow(&system.machine.put_on_walls(state)), 0.0);
         let mut motion = MachineMotion {
@@ -48,7 +53,7 @@ impl<'s> MachineMotion<'s> {
             sticking_time: 0.0,
             travelled: [0.0; MOST_COORDINATES],
             near_grazing: false,
-            is_tied: false,
+            remark: None,
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
         };
@@ -72,7 +77,7 @@ impl<'s> MachineMotion<'s> {
     {
         let mut started = MachineMotion::new(system, &self.state());
         started.take_modes_of(self);
-        started.is_tied = self.is_tied;
+        started.remark = started.remark.max(self.remark);
         started
     }
 
@@ -102,6 +107,7 @@ impl<'s> MachineMotion<'s> {
                 *slip = Slip::of(rate);
             }
         }
+        self.modes.pieces = system.pieces_at(&self.modes.slips, &self.point);
         self.has_slid = motion.modes.slips.map(|slip| slip != Slip::Stick);
         self.roots.from_rate = [0; MOST_FRICTION];
         system.hold(&self.modes, &mut self.point, false);
@@ -143,10 +149,12 @@ impl<'s> MachineMotion<'s> {
             self.modes.slips[i] = if at_rest.elements[i] { Slip::Stick } else { Slip::of(rate) };
             self.has_slid[i] = !at_rest.elements[i];
         }
+        self.modes.pieces = system.pieces_at(&self.modes.slips, &self.point);
+        (0..system.springs.len()).for_each(|spring| self.check_range(MOST_FRICTION + spring));
         self.refresh();
         for gap in 0..system.gaps() {
             if let Some(side) = system.pushed(&self.modes, gap) {
-                let force = system.force(self.modes.stage, gap, side);
+                let force = system.force(self.modes.stage, &self.modes.pieces, gap, side);
                 if self.domain.first_derivative(&force, &self.point, 0).1 <= 0.0 {
                     self.modes.gaps[gap] = GapMode::Open(side);
                 }

@@ -65,6 +65,7 @@ pub(crate) fn side_by_side(machines: &[Oscillator]) -> Oscillator {
         drives,
         gaps,
         friction,
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }
@@ -99,6 +100,7 @@ pub(crate) fn in_coordinates(machine: &Oscillator, t: &DMatrix<f64>) -> Oscillat
         friction: (machine.friction.iter())
             .map(|one| DryFriction { row: vector(&one.row), ..one.clone() })
             .collect(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }

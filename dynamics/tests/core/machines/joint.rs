@@ -36,6 +36,7 @@ fn row_of_masses(loads: &[f64]) -> Oscillator {
         drives: Vec::new(),
         gaps: (0..n).map(gap).collect(),
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }

@@ -240,6 +240,7 @@ pub(crate) fn case_of(structure: Structure, seed: u64, shape: Shape) -> Case {
         drives,
         gaps: Vec::new(),
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     };
@@ -324,7 +325,7 @@ fn add_friction(random: &mut Random, machine: &mut Oscillator, most: usize, gaps
         let size = row.norm();
         let (force, speed) = (random.logarithmic(0.02, 0.6) * force / size, speed * size);
         let speed = if random.chance(0.75) { 0.0 } else { random.even(0.5 * speed) };
-        machine.friction.push(DryFriction { row, force, speed });
+        machine.friction.push(DryFriction::new(row, force, speed));
     }
 }
 

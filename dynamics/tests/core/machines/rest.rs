@@ -31,6 +31,7 @@ fn machine(
         drives: vec![Drive { order: 1, cos, sin }],
         gaps: vec![GapRow { row: DVector::from_row_slice(gap), walls }],
         friction: Vec::new(),
+        springs: Vec::new(),
         signals: Vec::new(),
         timing: Timing::Forced,
     }
@@ -117,7 +118,7 @@ fn friction_holds_a_force_at_its_limit() {
     {
         let mut one = machine(DMatrix::identity(1, 1), 0.7, [force, 0.0], &[1.0], [Vec::new(), Vec::new()]);
         one.stages[0].load[0] = load;
-        one.friction = vec![DryFriction { row: DVector::from_element(1, 1.0), force: limit, speed: 0.0 }];
+        one.friction = vec![DryFriction::new(DVector::from_element(1, 1.0), limit, 0.0)];
         let state = after_a_period(&one, &[0.0, 0.0]);
         assert!(
             state.iter().all(|x| x.abs() < 1e-12),

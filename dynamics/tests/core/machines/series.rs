@@ -534,7 +534,7 @@ fn described(seed: u64, case: &Case) -> Oscillator {
         1 => {
             let force = random.logarithmic(0.02, 0.3) * machine.drives[0].cos.amax();
             let row = &machine.gaps[0].row * [1.0, -1.0, 0.7][random.below(3)];
-            machine.friction.push(DryFriction { force: force / row.norm(), row, speed: 0.0 });
+            machine.friction.push(DryFriction::new(row.clone(), force / row.norm(), 0.0));
         }
         _ => {}
     }

@@ -2,7 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::system::{Constraints, Domain, Key, Numbers, PhasePoint, ROUNDING, Slide, affine, dot, size};
+use super::system::{
+    CURVES, Constraints, Domain, Key, Numbers, PhasePoint, ROUNDING, Slide, affine, dot, size,
+};
 use super::{Ending, Event, Flight, Gap, Mode, Series, Slip, side_of, signed};
 use rattlemap_dynamics::model::{Contact, MOST_FRICTION, MOST_GAPS, Side, Wall};
 use rattlemap_dynamics::motion::EventKind;
@@ -94,6 +96,7 @@ impl Flight {
             self.slides[i] = self.slide_at(i, &point);
             at_rest.elements[i] = self.slides[i] == Slide::Sticks;
         }
+        self.pieces = system.pieces(&self.slides, &point);
         for gap in 0..system.gaps() {
             if let Some(force) = self.force(gap)
                 && self.domain().tendency(&force, &point, 0).1 <= 0.0
@@ -102,7 +105,7 @@ impl Flight {
             }
         }
         if let Some(chosen) = self.consistent(self.key(), &at_rest, &point) {
-            self.slides = chosen.slides;
+            (self.slides, self.pieces) = (chosen.slides, chosen.pieces);
         }
         self.hold();
         for i in (0..system.elements.len()).filter(|&i| at_rest.elements[i]) {
@@ -159,6 +162,7 @@ impl Flight {
                 self.record(gap, EventKind::MeshStart, side, t);
                 (self.gaps[gap].mode, self.gaps[gap].from_force) = (Mode::Plain, 1);
             }
+            Ending::Bends(i, is_upper) => return self.bend(i, is_upper, t),
             Ending::RateVanishes(i) => self.end_sliding(i, t),
             Ending::Slips(i, next) => {
                 self.begin_sliding(i, next, t);
@@ -166,6 +170,19 @@ impl Flight {
             }
         }
         self.settle(&exempt, t, t);
+    }
+
+    /// Enters the next piece of a curve if the argument passes the end of its piece.
+    fn bend(&mut self, i: usize, is_upper: bool, t: f64) {
+        let domain = self.domain();
+        let point = self.point(&domain, t);
+        let Some((_, row)) = self.system.bent(i, &self.slides) else { return };
+        let (order, outwards) = domain.tendency(&row, &point, 1);
+        let passes = outwards != 0.0 && (outwards > 0.0) == is_upper;
+        if passes {
+            self.pieces[i] = if is_upper { self.pieces[i] + 1 } else { self.pieces[i] - 1 };
+        }
+        self.at_end[i] = Some((is_upper != passes, order));
     }
 
     fn point(&self, domain: &Domain, t: f64) -> PhasePoint {
@@ -425,6 +442,7 @@ impl Flight {
             // An element that has only just begun to slide also counts as at rest.
             at_rest.elements[i] = key.slides[i] == Slide::Sticks || self.slide_at(i, &point) == Slide::Sticks;
         }
+        key.pieces = self.system.pieces(&key.slides, &point);
         self.consistent(key, &at_rest, &point)
     }
 
@@ -472,7 +490,7 @@ impl Flight {
         gaps && elements().all(|i| match key.slides[i] {
             Slide::Sticks => domain.holds[i].is_none_or(|hold| {
                 [-1.0, 1.0].into_iter().all(|sign| {
-                    let room = affine(&hold, sign, self.system.elements[i].force, domain.width);
+                    let room = affine(&hold, sign, self.system.elements[i].static_force, domain.width);
                     domain.tendency(&room, point, 0).1 >= 0.0
                 })
             }),
@@ -492,7 +510,7 @@ impl Flight {
                 tried.held[gap] = at_rest.gaps[gap].filter(|_| set >> at & 1 == 0);
             }
             for &i in elements.iter().rev() {
-                tried.slides[i] = Slide::ALL[slide % 3];
+                (tried.slides[i], tried.pieces[i]) = (Slide::ALL[slide % 3], 0);
                 slide /= 3;
             }
             tried
@@ -585,7 +603,7 @@ impl Flight {
     /// `stopped` has vanished.
     fn change(&mut self, next: &Key, stopped: Option<usize>, t: f64) {
         if stopped.is_some() {
-            self.change_slides(next.slides, stopped, t);
+            self.change_slides(next, stopped, t);
         }
         for gap in 0..self.system.gaps() {
             match (self.gaps[gap].mode, next.held[gap]) {
@@ -602,7 +620,7 @@ impl Flight {
             }
         }
         if stopped.is_none() {
-            self.change_slides(next.slides, None, t);
+            self.change_slides(next, None, t);
         }
         self.hold();
         for gap in 0..self.system.gaps() {
@@ -617,8 +635,9 @@ impl Flight {
         }
     }
 
-    fn change_slides(&mut self, next: [Slide; MOST_FRICTION], stopped: Option<usize>, t: f64) {
-        let before = std::mem::replace(&mut self.slides, next);
+    fn change_slides(&mut self, key: &Key, stopped: Option<usize>, t: f64) {
+        let (before, next) = (std::mem::replace(&mut self.slides, key.slides), key.slides);
+        (self.pieces, self.at_end) = (key.pieces, [None; CURVES]);
         let point = self.domain().point(&self.y, t);
         for i in (0..self.system.elements.len()).filter(|&i| before[i] != next[i]) {
             let is_at_rest = self.slide_at(i, &point) == Slide::Sticks || stopped == Some(i);
@@ -686,8 +705,12 @@ impl Flight {
     fn begin_sliding(&mut self, i: usize, next: Slide, t: f64) {
         let before = self.domain();
         let kept: Vec<usize> = (0..self.system.gaps()).filter(|&gap| self.is_kept(&before, gap)).collect();
-        self.slides[i] = next;
+        (self.slides[i], self.pieces[i]) = (next, 0);
         let domain = self.domain();
+        // The accelerations jump if friction is larger at rest than while sliding.
+        let element = &self.system.elements[i];
+        let jumps = element.static_force > element.force.at(0.0);
+        let release = if jumps { RELEASE_ORDER - 1 } else { RELEASE_ORDER };
         let point = self.point(&domain, t);
         let freed: Vec<usize> = kept.into_iter().filter(|&gap| !domain.is_still[gap]).collect();
         for &gap in &freed {
@@ -695,7 +718,7 @@ impl Flight {
                 && let Some((own, nth)) = self.next_wall(gap, side)
                 && own == side
                 && self.system.walls(gap, side)[nth].contact == Contact::Rigid
-                && side.sign() * domain.tendency(&domain.unit(gap), &point, 3).1 > 0.0
+                && side.sign() * domain.tendency(&domain.unit(gap), &point, release).1 > 0.0
             {
                 // From here on, the wall holds the gap.
                 self.slides[i] = Slide::Sticks;
@@ -704,12 +727,12 @@ impl Flight {
                 return;
             }
         }
-        self.from_rate[i] = 2;
+        self.from_rate[i] = if jumps { 1 } else { 2 };
         self.record_slip(i, Some(b'7'), t);
         for gap in freed {
-            self.gaps[gap].on_wall = self.gaps[gap].on_wall.map(|(side, _)| (side, RELEASE_ORDER));
+            self.gaps[gap].on_wall = self.gaps[gap].on_wall.map(|(side, _)| (side, release));
             if let Mode::Onset(_) = self.gaps[gap].mode {
-                self.gaps[gap].from_force = 1;
+                self.gaps[gap].from_force = release - 2;
             }
         }
     }

@@ -11,8 +11,9 @@ use std::rc::Rc;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, MOST_HARMONICS,
-    Oscillator, REST, Restitution, Side, Spring, State, Timing, Wall,
+    Contact, Curve, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS,
+    MOST_HARMONICS, MOST_SPRINGS, NonlinearSpring, Oscillator, REST, Restitution, Side, Spring, State,
+    Timing, Wall,
 };
 
 /// Largest number of entries of a point.
@@ -63,14 +64,28 @@ pub(super) struct Key {
     /// Sides of the rigid walls on which gaps rest.
     pub(super) held: [Option<Side>; MOST_GAPS],
     pub(super) slides: [Slide; MOST_FRICTION],
+    pub(super) pieces: Pieces,
 }
+
+/// Pieces of the friction forces, then of the nonlinear springs.
+pub(super) type Pieces = [u8; CURVES];
+pub(super) const CURVES: usize = MOST_FRICTION + MOST_SPRINGS;
 
 /// An element with dry friction: factors of `w` in the sliding rate.
 #[derive(Debug)]
 pub(super) struct Element {
     pub(super) row: DVector<f64>,
-    pub(super) force: f64,
+    pub(super) force: Curve,
+    pub(super) static_force: f64,
     pub(super) speed: f64,
+}
+
+/// A nonlinear spring: factors of `d` in the elongation, and the wall with which it acts.
+#[derive(Debug)]
+pub(super) struct BentSpring {
+    pub(super) row: DVector<f64>,
+    pub(super) force: Curve,
+    pub(super) wall: Option<(usize, Side)>,
 }
 
 /// The equations of motion of one combination of modes.
@@ -233,6 +248,7 @@ pub(super) struct System {
     factor: DMatrix<f64>,
     /// The elements that have a force.
     pub(super) elements: Vec<Element>,
+    pub(super) springs: Vec<BentSpring>,
     domains: RefCell<HashMap<Key, Rc<Domain>>>,
 }
 
@@ -250,18 +266,27 @@ impl System {
         let units = [length, length * machine.omega];
         let machine = transformed(machine, units, &from_coordinates);
         let factors = machine.mass.clone().cholesky().expect("the mass matrix is positive definite");
-        let element = |DryFriction { row, force, speed }: &DryFriction| {
-            // A row along a gap must not have rounding errors in other entries.
+        // A row along a gap must not have rounding errors in other entries.
+        let clean = |row: &DVector<f64>| {
             let least = ROUNDING * row.amax();
-            let row = row.map(|x| if x.abs() > least { x } else { 0.0 });
-            Element { row, force: *force, speed: *speed }
+            row.map(|x| if x.abs() > least { x } else { 0.0 })
+        };
+        let element = |friction: &DryFriction| {
+            let DryFriction { row, static_force, speed, .. } = friction;
+            Element { row: clean(row), force: friction.curve(), static_force: *static_force, speed: *speed }
+        };
+        let spring = |spring: &NonlinearSpring| BentSpring {
+            row: clean(&spring.row),
+            force: spring.curve(),
+            wall: spring.wall,
         };
         System {
             n: machine.degrees(),
             units,
             mobility: factors.inverse(),
             factor: factors.l().try_inverse().expect("the factor is regular"),
-            elements: machine.friction.iter().filter(|friction| friction.force > 0.0).map(element).collect(),
+            elements: machine.friction.iter().filter(|friction| friction.acts()).map(element).collect(),
+            springs: machine.springs.iter().map(spring).collect(),
             from_coordinates,
             to_coordinates,
             machine,
@@ -305,9 +330,36 @@ impl System {
         row
     }
 
+    /// Returns the force of a curve and the row of its argument, if its piece matters.
+    pub(super) fn bent(&self, i: usize, slides: &[Slide; MOST_FRICTION]) -> Option<(&Curve, Functional)> {
+        let (force, row) = if i < MOST_FRICTION {
+            let element = self.elements.get(i).filter(|_| slides[i] != Slide::Sticks)?;
+            (&element.force, affine(&self.sliding_rate(i), slides[i].sign(), 0.0, self.width()))
+        } else {
+            let spring = self.springs.get(i - MOST_FRICTION)?;
+            let mut row = [0.0; WIDTH];
+            row[..self.n].copy_from_slice(spring.row.as_slice());
+            (&spring.force, row)
+        };
+        (force.pieces.len() > 1).then_some((force, row))
+    }
+
+    /// Returns the pieces at a point.
+    pub(super) fn pieces(&self, slides: &[Slide; MOST_FRICTION], point: &PhasePoint) -> Pieces {
+        std::array::from_fn(|i| {
+            self.bent(i, slides).map_or(0, |(force, row)| force.piece(dot(&row, point)) as u8)
+        })
+    }
+
     /// Returns the row of the force of a side's last wall, positive away from the wall, if this wall only pushes. None if the force never
     /// pulls behind the wall.
-    pub(super) fn pushing(&self, gap: usize, side: Side, stage: usize) -> Option<Functional> {
+    pub(super) fn pushing(
+        &self,
+        gap: usize,
+        side: Side,
+        stage: usize,
+        pieces: &Pieces,
+    ) -> Option<Functional> {
         let wall = self.walls(gap, side).last()?;
         let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
         if wall.contact != Contact::Pushing || !may_pull {
@@ -317,6 +369,11 @@ impl System {
         let mut row = [0.0; WIDTH];
         (row[gap], row[self.n + gap]) = (s * spring.stiffness, s * spring.damping);
         row[self.width() - 1] = spring.preload - s * spring.stiffness * wall.at;
+        if let Some(i) = self.springs.iter().position(|spring| spring.wall == Some((gap, side))) {
+            let [slope, force] = self.springs[i].force.pieces[usize::from(pieces[MOST_FRICTION + i])];
+            row[gap] += s * slope;
+            row[self.width() - 1] += force;
+        }
         Some(row)
     }
 
@@ -356,8 +413,23 @@ impl System {
                 load[gap] += k * wall.at - side.sign() * preload;
             }
         }
-        for (element, slide) in self.elements.iter().zip(key.slides) {
-            load -= &element.row * (slide.sign() * element.force);
+        for (i, element) in self.elements.iter().enumerate() {
+            if key.slides[i] != Slide::Sticks {
+                let [slope, force] = element.force.pieces[usize::from(key.pieces[i])];
+                load -= &element.row * (key.slides[i].sign() * force - slope * element.speed);
+                damping += &element.row * element.row.transpose() * slope;
+            }
+        }
+        for (spring, piece) in self.springs.iter().zip(&key.pieces[MOST_FRICTION..]) {
+            let acts = spring.wall.is_none_or(|(gap, side)| {
+                let count = self.walls(gap, side).len() as i8;
+                key.acting[gap] == if side == Side::Right { count } else { -count }
+            });
+            if acts {
+                let [slope, force] = spring.force.pieces[usize::from(*piece)];
+                load -= &spring.row * force;
+                stiffness += &spring.row * spring.row.transpose() * slope;
+            }
         }
         let mut forces = DMatrix::zeros(n, width);
         forces.columns_mut(0, n).copy_from(&-&stiffness);
@@ -484,10 +556,21 @@ fn transformed(machine: &Oscillator, [length, speed]: [f64; 2], from: &DMatrix<f
         friction: machine
             .friction
             .iter()
-            .map(|DryFriction { row, force, speed: belt }| DryFriction {
-                row: &back * row,
-                force: force / length,
-                speed: belt / speed,
+            .map(|friction| DryFriction {
+                row: &back * &friction.row,
+                force: friction.force / length,
+                at_speed: friction.at_speed.iter().map(|[v, force]| [v / speed, force / length]).collect(),
+                static_force: friction.static_force / length,
+                speed: friction.speed / speed,
+            })
+            .collect(),
+        springs: machine
+            .springs
+            .iter()
+            .map(|spring| NonlinearSpring {
+                row: &back * &spring.row,
+                points: spring.points.iter().map(|[x, force]| [x / length, force / length]).collect(),
+                wall: spring.wall,
             })
             .collect(),
         signals: Vec::new(),
