@@ -37,6 +37,9 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("two-loose-gears", include_str!("../../models/two_loose_gears.toml")),
     ("absorber-chain", include_str!("../../models/absorber_chain.toml")),
     ("viscoelastic-ball", include_str!("../../models/viscoelastic_ball.toml")),
+    ("duffing", include_str!("../../models/duffing.toml")),
+    ("hertz-ball", include_str!("../../models/hertz_ball.toml")),
+    ("belt-oscillator", include_str!("../../models/belt_oscillator.toml")),
 ];
 
 /// The built-in models, read once. A test shows that each can be read.

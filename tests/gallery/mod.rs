@@ -14,6 +14,7 @@ mod elastic;
 mod engines;
 mod files;
 mod friction;
+mod laws;
 mod loose_gear;
 mod machines;
 mod meissner;

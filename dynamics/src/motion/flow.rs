@@ -184,6 +184,17 @@ impl Flow {
         }
     }
 
+    /// Whether the motion between events is linear: there are no nonlinear springs, and no friction that depends on the sliding rate.
+    pub(crate) fn is_linear_between_events(&self) -> bool {
+        match &self.engine {
+            Engine::Pair(_) => true,
+            Engine::Machine(system) => {
+                let machine = system.machine();
+                machine.springs.is_empty() && machine.friction.iter().all(|one| one.at_speed.is_empty())
+            }
+        }
+    }
+
     /// Returns the drift of a displacement, a gap or a signal, by its place, if a rigid-body mode shifts it. `rates`: those along the modes.
     pub(crate) fn drift(&self, place: usize, rates: &[f64]) -> Option<f64> {
         let along = |mode: &RigidMode| mode.along(place, self.signals());

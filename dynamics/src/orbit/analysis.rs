@@ -374,7 +374,8 @@ impl Analysis<'_> {
     /// neutral motion, where they separate in proportion to time. Without events the motion is linear and not chaotic.
     fn is_chaotic(&self, window: &Window) -> bool {
         let grows = || is_growing(self.flow, &window.strobes, window.lyapunov * self.flow.period);
-        if window.events == 0 || grows() || rests(&window.strobes, &window.metric, self.settings.max_period) {
+        let is_linear = window.events == 0 && self.flow.is_linear_between_events();
+        if is_linear || grows() || rests(&window.strobes, &window.metric, self.settings.max_period) {
             return false;
         }
         let least = window.lyapunov - CHAOS_ERRORS * window.lyapunov_error;

@@ -624,7 +624,8 @@ impl<'a> CellRun<'a> {
             |rate: f64| rate * periods * period <= neutral_growth(self.budget.exponent_from(), periods);
         // Without events the motion is linear: growth by negative damping is not chaos.
         let events_at = |n: usize| self.counts.get(n).map(|counts| counts[2]);
-        let is_linear = events_at(self.counts.len() - 1) == events_at(self.budget.exponent_from() as usize);
+        let is_linear = events_at(self.counts.len() - 1) == events_at(self.budget.exponent_from() as usize)
+            && self.analysis.flow.is_linear_between_events();
         let slow = is_linear
             || rests(window, &Metric::of(window, self.analysis.flow), max_period)
             || lyapunov.is_some_and(|(mean, _)| is_growing(self.analysis.flow, &self.strobes, mean * period))

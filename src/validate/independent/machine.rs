@@ -274,6 +274,7 @@ impl Flight {
         for gap in (0..system.gaps()).filter(is_at_rest) {
             (other.y[gap], other.y[n + gap]) = (self.y[gap], self.y[n + gap]);
         }
+        other.pieces = system.pieces(&self.slides, &domain.point(&other.y, 0.0));
         other
     }
 

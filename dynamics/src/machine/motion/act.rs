@@ -3,6 +3,7 @@
 use super::MachineMotion;
 use crate::machine::ROUNDING;
 use crate::machine::domain::STAYS_ZERO;
+use crate::machine::frame::SpringElement;
 use crate::machine::impact::{Impact, Outcome};
 use crate::machine::modes::{AtRest, GapMode, signed};
 use crate::machine::watch::Watch;
@@ -95,8 +96,9 @@ impl MachineMotion<'_> {
     /// Notes it if a nonlinear spring is beyond its points.
     pub(super) fn check_range(&mut self, i: usize) {
         let spring = i.checked_sub(MOST_FRICTION).map(|spring| &self.system.springs[spring]);
-        let is_beyond = |piece: usize, pieces: usize| piece == 0 || piece + 1 == pieces;
-        if spring.is_some_and(|own| is_beyond(self.modes.pieces[i].into(), own.curve.pieces.len())) {
+        let piece = usize::from(self.modes.pieces[i]);
+        let is_below = |own: &SpringElement| piece == 0 && own.wall.is_none();
+        if spring.is_some_and(|own| is_below(own) || piece + 1 == own.curve.pieces.len()) {
             self.remark = self.remark.max(Some(Remark::OutOfRange));
         }
     }
