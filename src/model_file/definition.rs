@@ -231,10 +231,16 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
         OscillatorError::Walls { walls } => return (Table::Wall(definition.gap_between(*walls), None), "at"),
     };
     if let Some((what, nth)) = quantity.rsplit_once("of friction") {
-        let key = ["force", "speed", "static"].into_iter().find(|key| what.starts_with(key));
+        let key = ["force", "speed", "static", "sliding rate"].into_iter().find(|key| what.starts_with(key));
         // The determinant is that of both rows.
-        let last = definition.friction.len();
-        return (Table::Friction(nth.trim().parse().unwrap_or(last)), key.unwrap_or("row"));
+        let nth = nth.trim().parse().unwrap_or(definition.friction.len());
+        let is_by_speed =
+            nth > 0 && definition.friction.get(nth - 1).is_some_and(|own| !own.at_speed.is_empty());
+        let key = match key {
+            Some("force" | "sliding rate") if is_by_speed => "force_at_speed",
+            key => key.unwrap_or("row"),
+        };
+        return (Table::Friction(nth), key);
     }
     if let Some((what, nth)) = quantity.rsplit_once("of nonlinear spring ") {
         let key = ["row", "range", "tolerance"].into_iter().find(|key| what.starts_with(key));

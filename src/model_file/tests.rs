@@ -765,7 +765,7 @@ fn errors_in_friction_name_the_field() {
     check_refusals(
         &with_friction(),
         r#"
-speed = "u" | slip = "u" | m.toml:39:1: unknown field `friction.0.slip = "u"`; valid names: row, force, speed
+speed = "u" | slip = "u" | m.toml:39:1: unknown field `friction.0.slip = "u"`; valid names: row, force, static, force_at_speed, speed
 row = [1, 0] | row = [1] | m.toml:42:7: `friction.1.row = [1]` is out of range: it must be the row of the sliding rate, row . v - speed: a list of two entries, one for each coordinate
 row = [1, 0] | row = { a = 1, q = -1 } | m.toml:42:7: `friction.1.row = { ... }` has the wrong type: it must be the row of the sliding rate, row . v - speed: a list of two entries, one for each coordinate
 row = [1, 0] | row = ["va", 0] | m.toml:42:8: `friction.1.row.0 = "va"` does not fit: `va` is a velocity, and entries are constants of a cell
@@ -795,6 +795,54 @@ gap = [1] | gap = [1]\nfriction = 1 | unknown field `motion.friction = 1`
     let (motion, _) = ONE_DEGREE.split_once("[[contact]]").unwrap();
     let end = "`contact` is missing; write [[contact]] with side, at and law; only a model with [[friction]] or [[spring]] may have no wall";
     check_refusal(motion, end);
+}
+
+/// Returns the text of a built-in model.
+fn text_of(name: &str) -> String {
+    FileModel::built_in(name).unwrap().definition().text.clone()
+}
+
+#[test]
+fn force_laws_are_refused_with_a_remedy() {
+    check_refusals(
+        &text_of("duffing"),
+        r#"
+range = "reach" | | m.toml:26:1: `spring.0.range` is missing; write the range of the elongation, such as range = 2 for -2 to 2
+range = "reach" | range = [1, 2] | `spring.0.range = [1, 2]` does not fit: at the defaults of duffing, range of nonlinear spring 1 = 1: it must be a range of finite length that contains 0
+tolerance = "tol" | tolerance = 1e-7 | `spring.0.tolerance = 1e-7` does not fit: at the defaults of duffing, tolerance of nonlinear spring 1 = 1e-7: it must be larger, or the range shorter: the force would need more than 32 linear pieces on a side
+force = "k*x + a*x^3" | force = "1 + x" | `spring.0.force = "1 + x"` does not fit: at the defaults of duffing, force at 0 of nonlinear spring 1 = 1: it must be 0; write a constant force in `load`
+[[spring]] | [[spring]]\nrow = [0] | `spring.0.row = [0]` does not fit: at the defaults of duffing, row of nonlinear spring 1 = 0: it must be not 0
+"#,
+    );
+    check_refusals(
+        &text_of("hertz-ball"),
+        r#"
+force = "k*depth^1.5" | stiffness = 3 | `contact.0.stiffness = 3` does not fit: it does not belong to law = "curve", whose force is given by `force`; remove it
+law = "curve" | law = "elastic"\nstiffness = 1 | `contact.0.force = "k*depth^1.5"` does not fit: it needs law = "curve"; remove it, or change the law
+"#,
+    );
+    check_refusals(
+        &text_of("belt-oscillator"),
+        r#"
+static = "fs" | static = 0.1 | `friction.0.static = 0.1` does not fit: at the defaults of belt-oscillator, static of friction 1 = 0.1: it must be finite and at least the force while sliding begins
+[[0, "f0"], ["w", "fd"]] | [[1, "f0"]] | `friction.0.force_at_speed = [[1, "f0"]]` does not fit: the first pair must have the sliding rate 0
+[[0, "f0"], ["w", "fd"]] | [[0, "f0"], [1, -2]] | `friction.0.force_at_speed = [[0, "f0"], [1, -2]]` does not fit: at the defaults of belt-oscillator, force of friction 1 = -2: it must be finite and at least 0
+static = "fs" | force = 1 | `friction.0.force_at_speed = [[0, "f0"], ["w", "fd"]]` does not fit: it says what `force` says; remove one of them
+"#,
+    );
+}
+
+#[test]
+fn equations_show_force_laws() {
+    let of = |name: &str| FileModel::built_in(name).unwrap().equations();
+    let springs = of("duffing");
+    assert_eq!(springs[0], "M x'' + C x' + springs = F(t)");
+    let spring = "spring  S = k*x + a*x^3 at the elongation x = x, from -(reach) to reach: 34 linear pieces, error 8.9e-4 of the largest force";
+    assert_eq!(springs[4..], [spring, "x'' + r x' + S = F cos(omega t)"]);
+    let friction = "friction  sticks at x' - u = 0 while |friction force| <= fs; f(r) = f0 at r = 0, fd at w, linear between, constant beyond";
+    assert_eq!(of("belt-oscillator")[4], friction);
+    let [row] = &FileModel::built_in("hertz-ball").unwrap().contacts()[..] else { panic!("one wall") };
+    assert_eq!(row[2], "curve, only pushes");
 }
 
 /// Three discs on a shaft, with stops between them and a mesh stiffness that changes.

@@ -79,6 +79,10 @@ pub(crate) fn draw(model: &FileModel) -> Canvas {
         hatch(&canvas, [(8.0, y + 12.0), (60.0, y + 12.0)], (-8.0, 8.0));
         y = write(&format!("dry friction {text}"), (72.0, y), DARK) + 0.4 * LINE;
     }
+    for text in lines_of("spring  ") {
+        sign(&canvas, Kind::Spring, [8.0, 60.0], y);
+        y = write(&format!("nonlinear spring {text}"), (72.0, y), DARK) + 0.4 * LINE;
+    }
     let phases: Vec<f64> =
         definition.motion.stages.iter().map(|phase| phase.evaluate(&|i| model.value(i))).collect();
     if !phases.is_empty() {
@@ -176,9 +180,17 @@ fn links(model: &FileModel) -> Vec<(usize, usize, Kind)> {
     };
     let of_stages = |rows: &[Vec<Staged>]| rows.iter().map(|row| row.iter().map(staged).collect()).collect();
     let mut links = Vec::new();
+    let mut stiffness: Vec<Vec<f64>> = of_stages(&motion.stiffness);
+    for spring in &model.definition().springs {
+        let row: Vec<f64> = spring.row.iter().map(number).collect();
+        let add = |(entries, factor): (&mut Vec<f64>, &f64)| {
+            entries.iter_mut().zip(&row).for_each(|(entry, other)| *entry += factor * other);
+        };
+        stiffness.iter_mut().zip(&row).for_each(add);
+    }
     for (kind, matrix) in [
         (Kind::Mass, motion.mass.iter().map(|row| row.iter().map(number).collect()).collect()),
-        (Kind::Spring, of_stages(&motion.stiffness)),
+        (Kind::Spring, stiffness),
         (Kind::Damper, of_stages(&motion.damping)),
     ] {
         let matrix: Vec<Vec<f64>> = matrix;
