@@ -5,9 +5,10 @@ fn begin_motion() {
     for (var i = 0u; i < DIM; i++) {
         motion.q[i] = start[i];
     }
-    // The host has packed the modes in the format of `pack_modes`.
-    tally.mode = u32(start[DIM]);
-    tally.origin = u32(start[DIM + 1u]);
+    // The host has packed the modes in the format of `pack_modes`, but for the stage.
+    let origin = u32(start[DIM + 1u]);
+    tally.mode = u32(start[DIM]) | ((origin >> 12u) << 19u);
+    tally.origin = origin & 0xfffu;
     tally.order = u32(start[DIM + 2u]);
     // The start already includes a change of the stage at phase 0.
     tally.next_change = u32(start[DIM + 3u]);

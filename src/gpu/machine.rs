@@ -418,8 +418,11 @@ impl MachineConstants {
         };
         let orders = modes.walls.map(|(_, order)| order);
         let packs = [
-            packed(5, &modes.gaps) | packed(2, &modes.slips) << 15 | modes.stage << 19,
-            packed(2, &modes.origins) | packed(2, &modes.walls.map(|(side, _)| side)) << 6,
+            packed(5, &modes.gaps) | packed(2, &modes.slips) << 15,
+            // The stage is here so that f32 holds each number exactly.
+            packed(2, &modes.origins)
+                | packed(2, &modes.walls.map(|(side, _)| side)) << 6
+                | modes.stage << 12,
             packed(3, &orders) | packed(3, &modes.from_force) << 9 | packed(3, &modes.from_rate) << 18,
         ];
         start.extend(packs.map(f64::from));

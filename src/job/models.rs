@@ -39,6 +39,10 @@ pub fn page(model: &FileModel) -> String {
     }
     if let Ok(oscillator) = model.oscillator() {
         text += &format!("    Engine: {}.\n", model_engine::described(&oscillator));
+        let stages = oscillator.schedule.len();
+        if stages > 0 {
+            text += &format!("    Stages: {stages} in a forcing period, at about 0.3 us each.\n");
+        }
     }
     text += "\nWalls\n\n";
     match &model.contacts()[..] {

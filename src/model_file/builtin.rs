@@ -28,6 +28,7 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("loose-gear", include_str!("../../models/loose_gear.toml")),
     ("mesh-stiffness", include_str!("../../models/mesh_stiffness.toml")),
     ("meissner", include_str!("../../models/meissner.toml")),
+    ("mathieu", include_str!("../../models/mathieu.toml")),
     ("clutch", include_str!("../../models/clutch.toml")),
     ("backlash", include_str!("../../models/backlash.toml")),
     ("friction-oscillator", include_str!("../../models/friction_oscillator.toml")),

@@ -97,10 +97,13 @@ impl Wall {
 
     /// Returns the entries on which the oscillator depends.
     pub(super) fn shaping_oscillator(&self) -> impl Iterator<Item = &Expression> {
-        let spring =
-            self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping, &spring.preload]);
         let curve = self.curve.iter().flat_map(ForceLaw::entries);
-        spring.flat_map(Entry::values).chain([&self.at]).chain(curve)
+        self.staged().flat_map(Entry::values).chain([&self.at]).chain(curve)
+    }
+
+    /// Returns the entries that may change with time.
+    pub(super) fn staged(&self) -> impl Iterator<Item = &Staged> {
+        self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping, &spring.preload])
     }
 
     /// Returns the entries on which the contact law depends.

@@ -14,6 +14,7 @@ use super::entry::{Names, Staged};
 use super::friction::{self, DryFriction};
 use super::motion::{self, Clock, MotionTable};
 use super::signal::{self, Signal};
+use super::steps::Steps;
 use super::{FileModel, parameters};
 use crate::text::document::{self, Node, Value};
 use crate::text::error::SceneError;
@@ -88,8 +89,9 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let written = parameters::read(&root)?;
     let names: Vec<&str> = written.iter().map(|parameter| parameter.name.as_str()).collect();
     let names = Names { parameters: &names, states: &[], stages: 0 };
-    let motion = motion::read(&root, names)?;
-    let states: Vec<&str> = motion.state_names().collect();
+    let mut motion = motion::read(&root, names)?;
+    let states: Vec<String> = motion.state_names().map(str::to_owned).collect();
+    let states: Vec<&str> = states.iter().map(String::as_str).collect();
     let names = Names { states: &states, stages: motion.stages.len(), ..names };
     let friction = friction::read(&root, names, motion.degrees())?;
     let springs = curve::read(&root, names, motion.degrees())?;
@@ -98,6 +100,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<FileModel, SceneError> {
     let defaults: Vec<f64> = written.iter().map(|parameter| parameter.default).collect();
     let walls =
         contact::read(&root, names, &motion.gaps, &defaults, !friction.is_empty() || !springs.is_empty())?;
+    motion::add_phase(&root, &mut motion, walls.iter().flatten().flatten().flat_map(Wall::staged))?;
     let mut definition = Definition {
         text: text.to_owned(),
         title: line("title")?.unwrap_or_else(|| name.clone()),
@@ -269,6 +272,7 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
         "difference" => (Table::Motion, if quantity.contains("mass") { "mass" } else { "stiffness" }),
         "excitation" => (Table::Motion, "frequency"),
         "phase" => (Table::Motion, "stages"),
+        "number" => (Table::Motion, "tolerance"),
         name @ ("cosine" | "sine") => {
             let order = quantity.rsplit(' ').next().and_then(|order| order.parse().ok());
             if order == Some(1) {
@@ -336,17 +340,23 @@ impl Definition {
 
     /// Builds the oscillator for values of the parameters. The caller validates it.
     pub(super) fn oscillator(&self, values: &[f64]) -> Result<Oscillator, OscillatorError> {
-        let (motion, values) = (&self.motion, Values(values));
-        let stages = motion.stages.len().max(1);
-        let forces = |stage: usize| Forces {
-            damping: values.matrix(&motion.damping, |entry| entry.in_stage(stage)),
-            stiffness: values.matrix(&motion.stiffness, |entry| entry.in_stage(stage)),
-            load: values.vector(motion.load.iter().map(|entry| entry.in_stage(stage))),
+        let motion = &self.motion;
+        let values = &Values { parameters: values, steps: self.steps(values)?, by_phase: &motion.by_phase };
+        let phases: Vec<f64> = match values.steps.count {
+            0 => motion.stages.iter().map(|phase| values.of(phase)).collect(),
+            count => (0..count).map(|stage| stage as f64 / count as f64).collect(),
         };
+        let stages = phases.len().max(1);
+        let forces = |stage: usize| Forces {
+            damping: values.matrix(&motion.damping, |entry| values.in_stage(entry, stage)),
+            stiffness: values.matrix(&motion.stiffness, |entry| values.in_stage(entry, stage)),
+            load: values.vector(&motion.load, |entry| values.in_stage(entry, stage)),
+        };
+        let vector = |entries: &[Expression]| values.vector(entries, |entry| values.of(entry));
         let drive = |order: u32, cos: &[Expression], sin: &[Expression]| Drive {
             order,
-            cos: values.vector(cos.iter()),
-            sin: values.vector(sin.iter()),
+            cos: vector(cos),
+            sin: vector(sin),
         };
         let first = drive(1, &motion.force, &motion.force_sin);
         let signals = self.signals.iter().map(|signal| signal.evaluated(|entry| values.of(entry)));
@@ -362,17 +372,14 @@ impl Definition {
                     walls.map(|(i, wall)| values.wall(wall, stages, &wall_name(motion, (nth, side), i)));
                 built.collect::<Result<Vec<_>, _>>()
             };
-            Ok(GapRow {
-                row: values.vector(motion.gaps[nth].row.iter()),
-                walls: [side(Side::Right)?, side(Side::Left)?],
-            })
+            Ok(GapRow { row: vector(&motion.gaps[nth].row), walls: [side(Side::Right)?, side(Side::Left)?] })
         };
         let gaps: Vec<GapRow> = (0..motion.gaps.len()).map(gap).collect::<Result<_, OscillatorError>>()?;
-        let springs = (1..).zip(&self.springs).map(|(nth, spring)| spring.evaluated(values.0, nth));
+        let springs = (1..).zip(&self.springs).map(|(nth, spring)| spring.evaluated(values.parameters, nth));
         let mut springs = springs.collect::<Result<Vec<_>, _>>()?;
         for (place, nth, law) in self.curves() {
             let (gap, side) = place;
-            let pieces = law.pieces(values.0, &wall_name(motion, place, nth))?;
+            let pieces = law.pieces(values.parameters, &wall_name(motion, place, nth))?;
             springs.push(wall_spring(
                 &gaps[gap].row,
                 place,
@@ -380,10 +387,9 @@ impl Definition {
                 pieces,
             ));
         }
-        let phases: Vec<f64> = motion.stages.iter().map(|phase| values.of(phase)).collect();
         let oscillator = Oscillator {
             omega: 1.0,
-            mass: values.matrix(&motion.mass, |entry| entry),
+            mass: values.matrix(&motion.mass, |entry| values.of(entry)),
             stages: (0..stages).map(forces).collect(),
             schedule: Oscillator::repeated(&phases, motion.repeat)?,
             drives: acts.then_some(first).into_iter().chain(further).collect(),
@@ -399,6 +405,11 @@ impl Definition {
             Clock::Natural => oscillator.slowest_natural_frequency().unwrap_or(TAU),
         };
         Ok(Oscillator { omega, ..oscillator })
+    }
+
+    /// Returns the stages that replace entries with the phase, for values of the parameters; no stage if there are none.
+    pub(super) fn steps(&self, values: &[f64]) -> Result<Steps, OscillatorError> {
+        if self.motion.by_phase.is_empty() { Ok(Steps::default()) } else { Steps::new(&self.motion, values) }
     }
 
     /// Returns the law of a pair for values of the parameters, and 0 for a machine. It may be asked for millions of cells, so that it does
@@ -420,25 +431,37 @@ impl Definition {
     }
 }
 
-/// Values of the parameters.
-struct Values<'a>(&'a [f64]);
+/// Values of the parameters, and the stages that replace entries with the phase.
+struct Values<'a> {
+    parameters: &'a [f64],
+    steps: Steps,
+    by_phase: &'a [Expression],
+}
 
 impl Values<'_> {
     fn of(&self, entry: &Expression) -> f64 {
-        entry.evaluate(&|index| self.0[index])
+        entry.evaluate(&|index| self.parameters[index])
     }
 
-    fn vector<'e>(&self, entries: impl ExactSizeIterator<Item = &'e Expression>) -> DVector<f64> {
-        DVector::from_iterator(entries.len(), entries.map(|entry| self.of(entry)))
+    fn in_stage(&self, entry: &Staged, stage: usize) -> f64 {
+        let place =
+            |by_phase: &Expression| self.by_phase.iter().position(|own| own.text() == by_phase.text());
+        match entry.by_phase().and_then(place) {
+            Some(place) => self.steps.mean(place, stage),
+            None => self.of(entry.in_stage(stage)),
+        }
     }
 
-    fn matrix<'e, T: 'e>(&self, rows: &'e [Vec<T>], entry: impl Fn(&'e T) -> &'e Expression) -> DMatrix<f64> {
-        let entries = rows.iter().flatten().map(|value| self.of(entry(value)));
-        DMatrix::from_row_iterator(rows.len(), rows.len(), entries)
+    fn vector<T>(&self, entries: &[T], value: impl Fn(&T) -> f64) -> DVector<f64> {
+        DVector::from_iterator(entries.len(), entries.iter().map(value))
+    }
+
+    fn matrix<T>(&self, rows: &[Vec<T>], value: impl Fn(&T) -> f64) -> DMatrix<f64> {
+        DMatrix::from_row_iterator(rows.len(), rows.len(), rows.iter().flatten().map(value))
     }
 
     fn spring(&self, spring: &WallSpring, stage: usize) -> Spring {
-        let of = |entry: &Staged| self.of(entry.in_stage(stage));
+        let of = |entry: &Staged| self.in_stage(entry, stage);
         Spring {
             stiffness: of(&spring.stiffness),
             damping: of(&spring.damping),
@@ -454,7 +477,7 @@ impl Values<'_> {
                 Some(Restitution::Constant(self.of(restitution)))
             }
             WallLaw::Impact { restitution, by_speed: true, .. } => {
-                let law = restitution.power_law(self.0.len(), &|index| self.0[index])?;
+                let law = restitution.power_law(self.parameters.len(), &|index| self.parameters[index])?;
                 Some(Restitution::BySpeed { constant: law.constant, factor: law.factor, power: law.power })
             }
         }

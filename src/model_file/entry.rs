@@ -1,29 +1,39 @@
-//! Entries of vectors and matrices: numbers or expressions in parameters, or one of these for each stage.
+//! Entries of vectors and matrices: numbers or expressions in parameters, one of these for each stage, or a function of the phase.
 
 use rattlemap_dynamics::model::MOST_COORDINATES;
 
+use super::steps::PHASE;
 use crate::text::document::Value;
 use crate::text::error::SceneError;
 use crate::text::expression::{Expression, ExpressionError};
 use crate::text::section::{Field, Section};
 
 /// What entries are, for messages.
-const CONSTANT: &str = "entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter";
+const CONSTANT: &str = "entries are constants of a cell; time enters only through `frequency`, `stages` and `phase`, coordinates do not enter";
 
 /// Lists with one value for each stage, for messages.
 const LISTS: &str = "a list with one value for each stage belongs to stiffness, damping, load and preload";
 
-/// An entry of stiffness, damping or load: one value, or one for each stage.
+/// An entry of stiffness, damping or load: one value, or one for each stage, or a function of the phase.
 #[derive(Clone, Debug)]
-pub struct Staged(Vec<Expression>);
+pub struct Staged {
+    values: Vec<Expression>,
+    /// Whether the only value contains the phase, a name with the index after those of all parameters.
+    is_by_phase: bool,
+}
 
 impl Staged {
     /// Returns the value in a stage.
     pub fn in_stage(&self, stage: usize) -> &Expression {
-        match &self.0[..] {
+        match &self.values[..] {
             [one] => one,
             each => &each[stage],
         }
+    }
+
+    /// Returns the function of the phase, if the entry is one.
+    pub fn by_phase(&self) -> Option<&Expression> {
+        self.values.first().filter(|_| self.is_by_phase)
     }
 }
 
@@ -62,7 +72,11 @@ impl Entry for Staged {
     const MAY_CHANGE: bool = true;
 
     fn read(field: &Field<'_>, names: Names<'_>) -> Result<Staged, SceneError> {
-        let Value::List(items) = &field.node.value else { return Ok(Staged(vec![names.entry(field)?])) };
+        let staged = |values| Staged { values, is_by_phase: false };
+        if let Some(value) = names.by_phase(field)? {
+            return Ok(Staged { values: vec![value], is_by_phase: true });
+        }
+        let Value::List(items) = &field.node.value else { return Ok(staged(vec![names.entry(field)?])) };
         if names.stages == 0 {
             return Err(field.conflict(
                 "a list has one value for each stage, but the model has no stages; write `stages` in [motion], or one value",
@@ -74,15 +88,15 @@ impl Entry for Staged {
                 names.stages
             )));
         }
-        Ok(Staged(field.list("")?.iter().map(|item| names.entry(item)).collect::<Result<_, _>>()?))
+        field.list("")?.iter().map(|item| names.entry(item)).collect::<Result<_, _>>().map(staged)
     }
 
     fn zero() -> Staged {
-        Staged(vec![Expression::zero()])
+        Staged { values: vec![Expression::zero()], is_by_phase: false }
     }
 
     fn values(&self) -> &[Expression] {
-        &self.0
+        &self.values
     }
 }
 
@@ -98,6 +112,21 @@ pub(super) struct Names<'a> {
 }
 
 impl Names<'_> {
+    /// Reads an entry that contains the phase; none if it does not.
+    fn by_phase(self, field: &Field<'_>) -> Result<Option<Expression>, SceneError> {
+        let Value::Text(text) = &field.node.value else { return Ok(None) };
+        let known: Vec<&str> = self.parameters.iter().copied().chain([PHASE]).collect();
+        let read = Expression::parse(text, &known).ok();
+        let found = read.filter(|entry| entry.uses().contains(&self.parameters.len()));
+        match found {
+            Some(_) if self.stages > 0 => Err(field.conflict(
+                "the program chooses the stages of an entry with `phase`, and the model has `stages`; remove `stages`, or write a list with \
+                 one value for each",
+            )),
+            found => Ok(found),
+        }
+    }
+
     /// Reads one entry.
     pub(super) fn entry(self, field: &Field<'_>) -> Result<Expression, SceneError> {
         if let Value::Text(text) = &field.node.value
@@ -126,8 +155,12 @@ impl Names<'_> {
             ),
             None if name == "t" || name == "time" => {
                 let force = "write the amplitude of the harmonic force in `force`, and a stiffness that changes with time \
-                             in `stages`";
+                             with `phase` or in `stages`";
                 ("the time", force.to_owned())
+            }
+            None if name == PHASE => {
+                let where_it_may = "only a whole entry of stiffness, damping, load or preload may contain it";
+                ("the phase of the forcing", where_it_may.to_owned())
             }
             None => return None,
         };

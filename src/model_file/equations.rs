@@ -8,11 +8,12 @@ use super::entry::{Entry, Staged};
 use super::friction::DryFriction;
 use super::motion::MotionTable;
 use super::signal::Signal;
+use super::steps::Steps;
 use crate::text::expression::Expression;
 
 /// Returns the equations as lines: the equation of all coordinates, gaps, stages, friction, and one equation per coordinate with a
-/// contact force for each gap that has walls. `names` are those of each gap and its velocity.
-pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<String> {
+/// contact force for each gap that has walls. `values` are those of the parameters, and `names` those of each gap and its velocity.
+pub(super) fn lines(definition: &Definition, values: &[f64], names: &[[String; 2]]) -> Vec<String> {
     let motion = &definition.motion;
     let has_walls = |index: usize| definition.walls[index].iter().any(|walls| !walls.is_empty());
     let suffixes = names.iter().map(|[z, _]| if names.len() == 1 { String::new() } else { format!("_{z}") });
@@ -23,6 +24,7 @@ pub(super) fn lines(definition: &Definition, names: &[[String; 2]]) -> Vec<Strin
         lines.push(format!("rate  {}", row(&gap.row, &motion.velocities, w)));
     }
     lines.extend(stages(motion));
+    lines.extend(steps(definition, values));
     lines.extend(acting(definition).map(|friction| {
         let rate = sliding_rate(friction, motion);
         let limit = text(friction.static_force.as_ref().unwrap_or(&friction.force));
@@ -59,7 +61,8 @@ fn matrices(definition: &Definition, suffixes: &[Option<String>]) -> Vec<String>
     let motion = &definition.motion;
     let term = |name: &str, rows: &[Vec<Staged>], factor: &str| {
         let mut entries = rows.iter().flatten();
-        let time = if entries.clone().any(|entry| same(entry).is_none()) { "(t)" } else { "" };
+        let changes = |entry: &Staged| same(entry).is_none() || entry.by_phase().is_some();
+        let time = if entries.clone().any(changes) { "(t)" } else { "" };
         entries.any(|entry| constant(entry).is_some()).then(|| format!("{name}{time}{factor}"))
     };
     let friction = acting(definition).next().map(|_| "friction".to_owned());
@@ -168,15 +171,35 @@ fn stages(motion: &MotionTable) -> Vec<String> {
     let count = motion.stages.len();
     let begins = (1..=count).zip(&motion.stages).map(|(i, phase)| format!("{i} from phase {}", text(phase)));
     let begins = begins.collect::<Vec<_>>().join(", ");
-    let span = match motion.repeat {
-        1 => "each forcing period".to_owned(),
-        repeat => format!("each 1/{repeat} of the forcing period"),
-    };
+    let span = span(motion.repeat);
     let stages = (1..=count).map(|i| format!("stage {i}")).collect::<Vec<_>>().join(" | ");
     vec![
         format!("stages  {begins} of {span}"),
         format!("        [{stages}] lists the values of an entry that changes"),
     ]
+}
+
+/// Returns the number and the error of the stages that replace entries with the phase; nothing without them.
+fn steps(definition: &Definition, values: &[f64]) -> Vec<String> {
+    let Ok(Steps { count: count @ 1.., error, .. }) = definition.steps(values) else { return Vec::new() };
+    let MotionTable { repeat, tolerance, .. } = &definition.motion;
+    vec![
+        format!(
+            "stages  {count} of equal length in {}, with the mean of each entry that contains the phase",
+            span(*repeat)
+        ),
+        format!(
+            "        their error is {error:.1e} of the largest value, within tolerance = {tolerance}; it falls with the square of their number"
+        ),
+    ]
+}
+
+/// Names the part of the forcing period in which all stages occur.
+fn span(repeat: u32) -> String {
+    match repeat {
+        1 => "each forcing period".to_owned(),
+        repeat => format!("each 1/{repeat} of the forcing period"),
+    }
 }
 
 /// Returns the definition of a signal, such as `signal  seat = x'' - A*omega^2 cos(omega t)`.

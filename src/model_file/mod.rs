@@ -16,6 +16,7 @@ mod harmonic;
 mod motion;
 mod parameters;
 mod signal;
+mod steps;
 #[cfg(test)]
 mod tests;
 
@@ -94,7 +95,7 @@ impl FileModel {
 
     /// Writes the equations of motion as lines, with a contact force for each gap that has walls.
     pub fn equations(&self) -> Vec<String> {
-        equations::lines(&self.definition, &self.gap_symbols())
+        equations::lines(&self.definition, &self.values, &self.gap_symbols())
     }
 
     /// Writes a row for each wall: name, position, law, restitution, largest rate at which contact is sustained, contact force.

@@ -11,9 +11,9 @@ use rattlemap_dynamics::model::{MOST_CHANGES, MOST_COORDINATES, MOST_GAPS, MOST_
 
 /// Keys of `[motion]`.
 #[rustfmt::skip]
-const MOTION_KEYS: [&str; 18] = [
+const MOTION_KEYS: [&str; 19] = [
     "coordinates", "velocities", "bodies", "mass", "damping", "stiffness", "force", "force_sin", "load", "frequency",
-    "time_scale", "stages", "repeat", "gap", "units", "gap_unit", "time_unit", "force_unit",
+    "time_scale", "stages", "repeat", "tolerance", "gap", "units", "gap_unit", "time_unit", "force_unit",
 ];
 
 /// Limits of all models, for messages.
@@ -21,6 +21,9 @@ const LIMITS: &str = "a model has one to eight coordinates and up to three gap r
 
 /// Names of several rows, for messages.
 const NAMED_ROWS: &str = "gap = { a = [1, -1, 0], b = [0, 1, -1] }";
+
+/// Default of `tolerance`.
+const TOLERANCE: f64 = 1e-3;
 
 /// Largest number of characters of a body's name.
 const LONGEST_BODY: usize = 40;
@@ -84,6 +87,10 @@ pub struct MotionTable {
     pub stages: Vec<Expression>,
     /// How often the stages recur in a forcing period.
     pub repeat: u32,
+    /// The different entries that contain the phase. Stages of equal length replace them.
+    pub by_phase: Vec<Expression>,
+    /// Largest error of these stages.
+    pub tolerance: f64,
     /// Gaps in the order of the file, one to three.
     pub gaps: Vec<Gap>,
     /// Units of coordinates, gap, time and contact forces.
@@ -176,6 +183,8 @@ pub(super) fn read(root: &Section<'_>, names: Names<'_>) -> Result<MotionTable, 
         clock: read_clock(&section, names, is_unforced)?,
         stages,
         repeat,
+        by_phase: Vec::new(),
+        tolerance: section.get("tolerance").map_or(Ok(TOLERANCE), |field| read_tolerance(&field))?,
         gaps,
         coordinates,
         velocities,
@@ -276,13 +285,8 @@ fn read_clock(section: &Section<'_>, names: Names<'_>, is_unforced: bool) -> Res
 fn read_stages(section: &Section<'_>, names: Names<'_>) -> Result<(Vec<Expression>, u32), SceneError> {
     let repeat = section.get("repeat");
     let Some(field) = section.get("stages") else {
-        return match repeat {
-            Some(field) => {
-                Err(field
-                    .conflict("it repeats the stages, but the model has none; write `stages` or remove it"))
-            }
-            None => Ok((Vec::new(), 1)),
-        };
+        let most = MOST_CHANGES as u32 / 2;
+        return Ok((Vec::new(), repeat.map_or(Ok(1), |field| field.whole(1..=most))?));
     };
     let phases = format!(
         "a list of 2 to {MOST_STAGES} phases at which stages begin, from 0 to 1, such as [\"0\", \"0.5\"]"
@@ -294,6 +298,58 @@ fn read_stages(section: &Section<'_>, names: Names<'_>) -> Result<(Vec<Expressio
     let most = (MOST_CHANGES / items.len()) as u32;
     let repeat = repeat.map_or(Ok(1), |field| field.whole(1..=most))?;
     Ok((items.iter().map(|item| names.entry(item)).collect::<Result<_, _>>()?, repeat))
+}
+
+fn read_tolerance(field: &Field<'_>) -> Result<f64, SceneError> {
+    let tolerance = field.number()?;
+    match tolerance > 0.0 && tolerance < 1.0 {
+        true => Ok(tolerance),
+        false => Err(field.out_of_range("above 0 and below 1, relative to the largest value of an entry")),
+    }
+}
+
+/// Adds the entries that contain the phase. They are like stages: the model is forced, and needs a frequency.
+pub(super) fn add_phase<'e>(
+    root: &Section<'_>,
+    motion: &mut MotionTable,
+    of_walls: impl Iterator<Item = &'e Staged>,
+) -> Result<(), SceneError> {
+    let own = [&motion.damping, &motion.stiffness].into_iter().flatten().flatten().chain(&motion.load);
+    let mut found: Vec<Expression> = own.filter_map(Staged::by_phase).cloned().collect();
+    found.extend(of_walls.filter_map(Staged::by_phase).cloned());
+    found.sort_by(|a, b| a.text().cmp(b.text()));
+    found.dedup_by(|a, b| a.text() == b.text());
+    let Some(section) = root.get("motion").and_then(|field| Section::open_any(field.node, &field.path))
+    else {
+        return Ok(());
+    };
+    if let Some(entry) = found.first() {
+        let stays = matches!(motion.clock, Clock::Frequency(_));
+        let remedy = format!("name it, such as frequency = \"omega\": `{}` contains the phase", entry.text());
+        return match section.get("time_scale") {
+            Some(field) => Err(field.conflict(
+                "with an entry that contains the phase, the forcing period is the clock; write `frequency`",
+            )),
+            None if stays => {
+                (motion.by_phase, motion.is_unforced) = (found, false);
+                Ok(())
+            }
+            None => Err(section.missing("frequency", &remedy)),
+        };
+    }
+    for (key, is_idle, what) in [
+        (
+            "repeat",
+            motion.stages.is_empty(),
+            "it repeats the stages, but the model has none; write `stages` or remove it",
+        ),
+        ("tolerance", true, "it is that of entries with `phase`, but the model has none; remove it"),
+    ] {
+        if let Some(field) = section.get(key).filter(|_| is_idle) {
+            return Err(field.conflict(what));
+        }
+    }
+    Ok(())
 }
 
 fn read_names(field: &Field<'_>, expected: &str) -> Result<Vec<String>, SceneError> {

@@ -170,9 +170,9 @@ restitution = "e" | | m.toml:23:1: `contact.0.restitution` is missing
 "impact" | "sticky" | `contact.0.law = "sticky"` is not known; valid names: impact, elastic
 "2*zeta" | "2*zta" | m.toml:16:13: `motion.damping.0.0 = "2*zta"` has an unknown name, `zta`: did you mean `zeta`?
 "2*zeta" | "2*y" | has an unknown name, `y`
-"2*zeta" | "x^2" | m.toml:16:13: `motion.damping.0.0 = "x^2"` does not fit: `x` is a coordinate, and entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter; write the factor of x in `stiffness`
+"2*zeta" | "x^2" | m.toml:16:13: `motion.damping.0.0 = "x^2"` does not fit: `x` is a coordinate, and entries are constants of a cell; time enters only through `frequency`, `stages` and `phase`, coordinates do not enter; write the factor of x in `stiffness`
 "2*zeta" | "zeta*v" | `v` is a velocity, and entries are constants of a cell
-"F*omega^2" | "F*cos(omega*t)" | m.toml:18:10: `motion.force.0 = "F*cos(omega*t)"` does not fit: `t` is the time, and entries are constants of a cell; time enters only through `frequency` and `stages`, coordinates do not enter; write the amplitude of the harmonic force in `force`, and a stiffness that changes with time in `stages`
+"F*omega^2" | "F*cos(omega*t)" | m.toml:18:10: `motion.force.0 = "F*cos(omega*t)"` does not fit: `t` is the time, and entries are constants of a cell; time enters only through `frequency`, `stages` and `phase`, coordinates do not enter; write the amplitude of the harmonic force in `force`, and a stiffness that changes with time with `phase` or in `stages`
 "F*omega^2" | "time" | `time` is the time
 at = "s" | at = "s + x" | m.toml:25:6: `contact.0.at = "s + x"` does not fit: `x` is a coordinate
 "2*zeta" | "2*" | m.toml:16:13: `motion.damping.0.0 = "2*"` cannot be read to its end
@@ -581,10 +581,9 @@ fn errors_in_stages_name_the_field_and_the_stage() {
         STAGES,
         r#"
 stages = [0, "eps - 1"] | | m.toml:13:13: `motion.damping.0.0 = ["c", "2*c"]` does not fit: a list has one value for each stage, but the model has no stages; write `stages` in [motion], or one value
-stages = [0, "eps - 1"] | repeat = 2 | m.toml:18:10: `motion.repeat = 2` does not fit: it repeats the stages, but the model has none
 stages = [0, "eps - 1"] | stages = [0, 0.2, 0.5] | m.toml:13:13: `motion.damping.0.0 = ["c", "2*c"]` is out of range: it must be one value, or a list of 3 values, one for each stage
-stages = [0, "eps - 1"] | stages = ["0"] | `motion.stages = ["0"]` is out of range: it must be a list of 2 to 8 phases at which stages begin
-stages = [0, "eps - 1"] | stages = "eps" | `motion.stages = "eps"` has the wrong type: it must be a list of 2 to 8 phases
+stages = [0, "eps - 1"] | stages = ["0"] | `motion.stages = ["0"]` is out of range: it must be a list of 2 to 64 phases at which stages begin
+stages = [0, "eps - 1"] | stages = "eps" | `motion.stages = "eps"` has the wrong type: it must be a list of 2 to 64 phases
 stages = [0, "eps - 1"] | stages = [0, "x"] | `x` is a coordinate
 stages = [0, "eps - 1"] | stages = [0, "eps"] | m.toml:18:10: `motion.stages = [0, "eps"]` does not fit: at the defaults of mesh, phase at which stage 2 begins = 1.5: it must be at least 0, less than 1, and greater than the phase before it
 stages = [0, "eps - 1"] | repeat = 20\nstages = [0, "eps"] | phase at which stage 2 begins = 1.5: it must be
@@ -612,6 +611,82 @@ fn phases_out_of_order_are_found_for_later_values() {
     assert!(
         error.starts_with("phase at which stage 2 begins = 1: it must be at least 0, less than 1"),
         "{error}"
+    );
+}
+
+/// The mesh of [`STAGES`] with entries that depend on the phase.
+fn by_phase() -> String {
+    let plain = STAGES.replace("[\"10*k1\", \"10*k2\"]", "\"10*k1*(1 + 0.2*cos(phase))\"");
+    let plain =
+        plain.replace("[\"c\", \"2*c\"]", "\"c\"").replace("[\"k1\", \"k2\"]", "\"k1 + 2*sin(2*phase)\"");
+    plain
+        .replace("[\"F\", \"-F\"]", "\"F\"")
+        .replace("[1, \"c\"]", "\"c\"")
+        .replace("stages = [0, \"eps - 1\"]", "tolerance = 0.01")
+}
+
+#[test]
+fn stages_have_the_means_of_entries_with_the_phase() {
+    let mut model = read(&by_phase());
+    let oscillator = model.oscillator().unwrap();
+    let count = oscillator.stages.len();
+    // The integral of 2 sin(2 phase) differs most: by up to 2 pi^2 / count^2, and by half of this on average, for a largest value of 6.
+    assert_eq!((count, oscillator.schedule[1]), (14, (1.0 / 14.0, 1)));
+    for (stage, (forces, spring)) in
+        oscillator.stages.iter().zip(&oscillator.gaps[0].walls[0][0].springs).enumerate()
+    {
+        let [from, to] = [stage, stage + 1].map(|end| std::f64::consts::TAU * end as f64 / count as f64);
+        let mean = |integral: fn(f64) -> f64| (integral(to) - integral(from)) / (to - from);
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-8, "stage {stage}: {a} {b}");
+        near(forces.stiffness[(0, 0)], 4.0 + mean(|phase| -(2.0 * phase).cos()));
+        near(spring.stiffness, 40.0 + 8.0 * mean(f64::sin));
+        assert_eq!((spring.damping, forces.load[1]), (0.5, 0.25));
+        // Half a period later, the stiffness of free motion is equal to the bit.
+        assert_eq!(forces.stiffness, oscillator.stages[(stage + count / 2) % count].stiffness);
+    }
+    assert_eq!(
+        model.equations()[4..],
+        [
+            "stages  14 of equal length in each forcing period, with the mean of each entry that contains the phase",
+            "        their error is 8.5e-3 of the largest value, within tolerance = 0.01; it falls with the square of their number",
+            "x'' + c x' + (k1 + 2*sin(2*phase)) x - y + N = 0",
+            "2 y'' + y' - x + 5 y - N = F",
+        ]
+    );
+    assert!(model.equations()[0].starts_with("M x'' + C x' + K(t) x"), "{:?}", model.equations());
+    assert_eq!(model.contacts()[0][5], "10*k1*(1 + 0.2*cos(phase)) (z - 0.5) + c w");
+    assert!(!crate::model_file::is_unforced(&model));
+    // The stages follow the values.
+    model.set("k1", 40.0).unwrap();
+    assert_eq!(model.oscillator().unwrap().stages.len(), 8);
+    let repeated = read(&by_phase().replace("tolerance", "repeat = 3\ntolerance")).oscillator().unwrap();
+    assert_eq!((repeated.stages.len(), repeated.schedule.len()), (14, 42));
+}
+
+#[test]
+fn errors_in_entries_with_the_phase_name_the_field_and_the_remedy() {
+    check_refusals(
+        &by_phase(),
+        r#"
+tolerance = 0.01 | tolerance = 1e-5 | m.toml:18:13: `motion.tolerance = 1e-5` does not fit: at the defaults of mesh, number of stages for a tolerance of 0.00001 = 412: it must be at most 64, and `repeat` times it at most 1024; write a larger `tolerance`
+tolerance = 0.01 | tolerance = 0.01\nrepeat = 100 | number of stages for a tolerance of 0.01 = 14: it must be at most 64, and `repeat` times it
+tolerance = 0.01 | tolerance = 0 | `motion.tolerance = 0` is out of range: it must be above 0 and below 1
+tolerance = 0.01 | stages = [0, 0.5] | m.toml:14:15: `motion.stiffness.0.0 = "k1 + 2*sin(2*phase)"` does not fit: the program chooses the stages of an entry with `phase`, and the model has `stages`; remove `stages`
+frequency = 2 | | `motion.frequency` is missing; name it
+frequency = 2 | time_scale = 2 | `motion.time_scale = 2` does not fit: with an entry that contains the phase, the forcing period is the clock
+[1, -1] | ["phase", -1] | `phase` is the phase of the forcing, and entries are constants of a cell; time enters only through `frequency`, `stages` and `phase`, coordinates do not enter; only a whole entry of stiffness, damping, load or preload may contain it
+at = 0.5 | at = "phase" | `contact.0.at = "phase"` does not fit: `phase` is the phase of the forcing
+"10*k1*(1 + 0.2*cos(phase))" | "k1*cos(phase)" | does not fit: at the defaults of mesh, stiffness of right wall 1 = -
+"k1 + 2*sin(2*phase)" | "log(phase - 1)" | stiffness in stage 1 = NaN: it must be a finite number
+"#,
+    );
+    check_refusal(
+        &ONE_DEGREE.replace("[motion]", "[motion]\nrepeat = 2"),
+        "`motion.repeat = 2` does not fit: it repeats the stages, but the model has none",
+    );
+    check_refusal(
+        &STAGES.replace("stages =", "tolerance = 0.1\nstages ="),
+        "`motion.tolerance = 0.1` does not fit: it is that of entries with `phase`, but the model has none",
     );
 }
 

@@ -168,7 +168,8 @@ fn coordinates(canvas: &Canvas, model: &FileModel) -> f64 {
 /// parameters, slightly changed, because parameters that happen to be equal or 0 are no property of the model.
 fn links(model: &FileModel) -> Vec<(usize, usize, Kind)> {
     let motion = &model.definition().motion;
-    let changed = |i: usize| match model.value(i) {
+    // The name after those of all parameters is the phase.
+    let changed = |i: usize| match model.parameters().get(i).map_or(0.0, |_| model.value(i)) {
         0.0 => 0.7 + 0.01 * i as f64,
         value => value * (1.0 + 0.003 * (i as f64 + 1.0).sin()),
     };

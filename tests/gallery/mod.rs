@@ -17,6 +17,7 @@ mod friction;
 mod laws;
 mod loose_gear;
 mod machines;
+mod mathieu;
 mod meissner;
 mod models;
 mod pieces;

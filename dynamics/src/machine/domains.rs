@@ -7,7 +7,7 @@ use super::domain::{DomainKey, LinearDomain};
 use super::frame::Frame;
 use super::modes::{AtRest, GapMode, Modes};
 use super::{PhasePoint, ROUNDING};
-use crate::model::{MOST_STAGES, Oscillator};
+use crate::model::Oscillator;
 use crate::motion::Slip;
 
 /// A machine, prepared for its motions. All motions share its domains, which are built on first use.
@@ -15,7 +15,7 @@ use crate::motion::Slip;
 pub struct System {
     frame: Frame,
     /// One list of domains for each stage.
-    domains: Arc<[Domains; MOST_STAGES]>,
+    domains: Arc<[Domains]>,
 }
 
 /// A linked list of domains that grows at its end. A search takes no lock.
@@ -39,7 +39,8 @@ impl Deref for System {
 impl System {
     /// Prepares a machine that [`Oscillator::validate`] accepts.
     pub fn new(machine: &Oscillator) -> System {
-        System { frame: Frame::new(machine), domains: Arc::default() }
+        let domains = machine.stages.iter().map(|_| Domains::default()).collect();
+        System { frame: Frame::new(machine), domains }
     }
 
     /// Returns the domain of a combination of modes, and builds it on first use.

@@ -613,7 +613,7 @@ impl Oscillator {
         };
         count("coordinates", n, MOST_COORDINATES, "1 to 8")?;
         count("gaps", self.gaps.len(), MOST_GAPS.min(n), "1 to 3, and not more than coordinates")?;
-        count("the number of stages", stages, MOST_STAGES, "1 to 8")?;
+        count("the number of stages", stages, MOST_STAGES, "1 to 64")?;
         let elements = self.friction.len();
         require(
             elements <= MOST_FRICTION.min(n),

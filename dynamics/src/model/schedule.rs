@@ -9,7 +9,7 @@ use super::error::require;
 const SAME_PHASE: f64 = 1e-12;
 
 /// Largest number of stages.
-pub const MOST_STAGES: usize = 8;
+pub const MOST_STAGES: usize = 64;
 
 /// Largest number of changes of the stage in a forcing period.
 pub const MOST_CHANGES: usize = 1024;
