@@ -37,6 +37,7 @@ mod watch;
 pub use domains::System;
 pub use frame::Frame;
 pub use impact::LOWEST_FLIGHT;
+pub(crate) use motion::CarriedModes;
 pub use motion::MachineMotion;
 pub use outputs::{Outputs, Situation};
 pub use table::{Equations, StartModes};

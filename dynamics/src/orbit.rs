@@ -17,6 +17,7 @@ mod reading;
 mod recurrence;
 mod regularity;
 mod resolution;
+mod run_up;
 mod search_filter;
 mod section;
 #[cfg(test)]
@@ -40,6 +41,7 @@ pub use quantities::{
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};
 pub use resolution::rounding_decides;
+pub use run_up::run_up;
 use section::Section;
 pub use trace::trace;
 

@@ -13,6 +13,7 @@ use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
 use crate::map::scene::{Along, FigureStyle, Format, MAX_PERIODS, toml};
 use crate::map::shard::Shard;
 use crate::model_file::{DEFAULT as DEFAULT_MODEL, FileModel};
+use crate::show::run_up::Ramp;
 use crate::store::inventory::figure_formats;
 use crate::store::orbit::{HistoryRequest, TABLED};
 use crate::text::printable::is_printable;
@@ -550,7 +551,8 @@ pub(crate) struct Orbit {
     pub(crate) transient: u32,
 
     /// Also print the state at time T; the motion starts at time 0 and phase 0. At the time of an event it is the state after
-    /// the event. The state is exact to rounding, but rounding errors grow with time if the motion is chaotic. Example: --time 10
+    /// the event. The state is exact to rounding, but rounding errors grow with time if the motion is chaotic. With --run-up it is the
+    /// time of the run-up, and no state is printed. Example: --time 10
     #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = time)]
     pub(crate) time: Option<f64>,
 
@@ -564,6 +566,13 @@ pub(crate) struct Orbit {
     /// periods 96 to 100 [default: N]
     #[arg(long, value_name = "M", requires = "from_start", value_parser = clap::value_parser!(u64).range(1..=30_000_000))]
     pub(crate) to_period: Option<u64>,
+
+    /// Change a parameter during the motion, linearly over the time --time. Its value is constant within a forcing period and changes
+    /// at phase 0. Writes trajectory.csv, events.csv, orders.csv and the figures run_up and campbell. Example:
+    /// --run-up omega=0.5:1.5 --time 3000 --out out/run-up
+    #[arg(long, value_name = "NAME=FROM:TO", allow_hyphen_values = true, requires_all = ["time", "out"],
+          conflicts_with_all = ["periods", "transient", "from_start", "json"])]
+    pub(crate) run_up: Option<String>,
 
     /// Print a JSON object instead of a summary
     #[arg(long)]
@@ -632,6 +641,27 @@ impl Orbit {
             format!("--to-period {last}: {periods} periods end at period {periods} or later; give --from-start {last} or less")
         })?;
         Ok(Some(HistoryRequest { start: self.start(), skipped, periods, samples: TABLED }))
+    }
+
+    /// The requested run-up.
+    ///
+    /// # Errors
+    /// If it is not `NAME=FROM:TO` with finite numbers, or if the time is 0.
+    pub(crate) fn ramp(&self) -> Result<Option<Ramp>, String> {
+        let Some((text, time)) = self.run_up.as_ref().zip(self.time) else { return Ok(None) };
+        let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.is_finite());
+        let read = || {
+            let (name, range) = text.split_once('=')?;
+            let (from, to) = range.split_once(':')?;
+            Some(Ramp { name: name.trim().to_owned(), from: number(from)?, to: number(to)?, time })
+        };
+        match read() {
+            None => Err(format!(
+                "--run-up {text}: it must be NAME=FROM:TO with two numbers, such as omega=0.5:1.5"
+            )),
+            Some(_) if time == 0.0 => Err("--time 0: the time of a --run-up must be above 0".to_owned()),
+            ramp => Ok(ramp),
+        }
     }
 
     /// The integration settings. The longest period is half the observed periods, because a cycle must be observed twice.

@@ -17,7 +17,8 @@ use crate::cli::say;
 use crate::job::model_choice;
 use crate::map::scene::{self, Format};
 use crate::show::orbit_json::{history_to_json, to_json};
-use crate::show::orbit_summary::{history_summary, summary};
+use crate::show::orbit_summary::{history_summary, run_up_summary, summary};
+use crate::show::run_up::Ramp;
 use crate::store;
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
@@ -34,6 +35,9 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
         model_choice::check_components(&model, start.count)?;
     }
     let model = scene::single_cell(&model, &arguments.set)?;
+    if let Some(ramp) = arguments.ramp().map_err(|text| Failure::Usage(anyhow!(text)))? {
+        return run_up(arguments, &*model, ramp, &style);
+    }
     let flow = Flow::of(&*model)?;
     check_time(arguments.time, flow.period)?;
     let request = arguments.history().map_err(|text| Failure::Usage(anyhow!(text)))?;
@@ -88,6 +92,43 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
         store::orbit::write(folder, &*model, &orbit, &request, figures)
     })?;
     fail_if(orbit.class == Class::Failed, "the integration failed; `status` says why")
+}
+
+/// Computes and writes a run-up.
+fn run_up(
+    arguments: &Orbit,
+    model: &dyn Model,
+    ramp: Ramp,
+    style: &scene::FigureStyle,
+) -> Result<(), Failure> {
+    let given = arguments.run_up.as_deref().unwrap_or_default();
+    let usage = |reason: String| Failure::Usage(anyhow!("--run-up {given}: {reason}"));
+    model.get(&ramp.name).map_err(|error| usage(error.to_string()))?;
+    let segments = ramp.segments(model).map_err(|error| usage(error.to_string()))?;
+    let interrupt = Interrupt::listen(true)?;
+    let folder = arguments.out.as_ref().map(|dir| Folder::open(dir, arguments.force)).transpose()?;
+    if let Some(folder) = &folder {
+        folder.prepare(store::orbit::names())?;
+    }
+    let (clock, start) = (Instant::now(), arguments.start());
+    let total: usize = segments.iter().map(|segment| segment.periods as usize).sum();
+    let mut progress = None;
+    let mut report = |done: u64| {
+        if clock.elapsed() > SILENCE {
+            let begin = || Progress::of(total, done as usize, "forcing periods", false, true);
+            progress.get_or_insert_with(begin).report(done as usize, total);
+        }
+    };
+    let run = ramp.run(model, segments, start, interrupt.raised(), &mut report);
+    if let Some(progress) = progress {
+        progress.clear();
+    }
+    let run = run.map_err(|stopped| Failure::Run(anyhow!("--run-up {given}: {stopped}")))?;
+    let run = run.ok_or_else(|| interrupt.failure("interrupted; nothing was written".to_owned()))?;
+    print(&broken(&run_up_summary(model, &run, &start)))?;
+    finish(arguments, folder, style, |folder, figures| {
+        store::orbit::write_run_up(folder, model, &run, &start, clock.elapsed(), figures)
+    })
 }
 
 /// Longest row of a summary, in characters.

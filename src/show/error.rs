@@ -2,6 +2,8 @@
 
 use std::io;
 
+use rattlemap_dynamics::model::ModelError;
+
 /// Remedy for an error of the operating system on writing, to be appended to its text; empty if there is no particular one.
 pub fn remedy(kind: io::ErrorKind) -> &'static str {
     match kind {
@@ -36,6 +38,9 @@ pub enum WriteError {
     /// Pixels that could not be encoded as PNG.
     #[error(transparent)]
     Png(#[from] png::EncodingError),
+    /// A model without a motion.
+    #[error(transparent)]
+    Model(#[from] ModelError),
     /// A typeface that could not be embedded in a PDF.
     #[error("the typeface cannot be embedded: {0}")]
     Typeface(#[from] subsetter::Error),
@@ -51,7 +56,9 @@ impl WriteError {
                 _ => None,
             },
             WriteError::Json(error) => error.io_error_kind(),
-            WriteError::Png(_) | WriteError::Size { .. } | WriteError::Typeface(_) => None,
+            WriteError::Png(_) | WriteError::Size { .. } | WriteError::Model(_) | WriteError::Typeface(_) => {
+                None
+            }
         };
         kind.map_or("", remedy)
     }

@@ -24,6 +24,7 @@ pub mod provenance;
 pub mod refinement;
 pub mod replay;
 pub mod report;
+pub mod run_up;
 mod sketch;
 pub mod symbols;
 pub mod table;

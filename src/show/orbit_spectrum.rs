@@ -130,13 +130,13 @@ fn windows(signal: &[f64]) -> Vec<&[f64]> {
 }
 
 /// Returns the Hann window at a share of its length.
-fn hann(share: f64) -> f64 {
+pub(crate) fn hann(share: f64) -> f64 {
     0.5 - 0.5 * (TAU * share).cos()
 }
 
 /// Returns root mean square amplitudes over parts of equal length, from frequency 0 to half the sampling frequency. A harmonic
 /// motion of amplitude 1 at one of these frequencies gives 1.
-fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(crate) fn amplitudes(parts: &[&[f64]], window: impl Fn(f64) -> f64) -> Vec<f64> {
     let count = parts[0].len();
     let weights: Vec<f64> = (0..count).map(|i| window(i as f64 / count as f64)).collect();
     let whole: f64 = weights.iter().sum();

@@ -7,10 +7,11 @@ use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
+use crate::show::run_up::{Ramp, RunUp};
 use crate::show::symbols::with_unit;
 use rattlemap_dynamics::model::{Model, Parameter, State, Timing};
 use rattlemap_dynamics::number::significant;
-use rattlemap_dynamics::orbit::{Class, Event, History, Orbit, SlipPoint, Status};
+use rattlemap_dynamics::orbit::{Class, Event, EventKind, History, Orbit, SlipPoint, Status};
 
 /// Largest number of events in the table, and number of events before those that are left out. The summary above the table
 /// stays on the screen.
@@ -80,6 +81,26 @@ pub fn history_summary(
         ),
     };
     text
+}
+
+/// Describes a run-up from a start.
+pub fn run_up_summary(model: &dyn Model, run: &RunUp, start: &State) -> String {
+    let Ramp { name, from, to, time } = &run.ramp;
+    let time = with_unit(&significant(*time), model.units().time.as_deref());
+    let periods: u32 = run.parts.iter().map(|(segment, _)| segment.periods).sum();
+    let events = || run.parts.iter().flat_map(|(_, history)| &history.events);
+    let count = |kind: EventKind| events().filter(|event| event.kind == kind).count();
+    let mut facts = vec![
+        ("parameters", parameters(model)),
+        ("start", state(model, Instant { time: 0.0, state: *start })),
+        ("run-up", format!("{name} from {from:?} to {to:?} in the time {time}")),
+        (timing(model).names()[1], periods.to_string()),
+        ("impacts", count(EventKind::Impact).to_string()),
+        ("contacts begun", count(EventKind::MeshStart).to_string()),
+    ];
+    let end = run.parts.last().and_then(|(_, history)| history.samples.last());
+    facts.extend(end.map(|end| ("end", state(model, Instant { time: end.t, state: end.state }))));
+    facts.iter().map(|(label, value)| format!("{label:<21} {value}\n")).collect()
 }
 
 /// Formats a requested state with all digits.

@@ -10,11 +10,13 @@ use serde_json::{Value, json};
 use crate::map::scene::{FigureStyle, Format};
 use crate::show::drawing::write_figure;
 use crate::show::figure::orbit::{self as figure, OrbitFigure, OrbitPlot, spectrum};
+use crate::show::figure::run_up as run_up_figures;
 pub use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_json::to_json;
 use crate::show::orbit_spectrum::{Spectrum, samples_per_period};
 use crate::show::parameters::Parameters;
+use crate::show::run_up::{RunUp, Series};
 use crate::show::table::orbit_tables::{self, Moment};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
@@ -28,6 +30,7 @@ const JSON: &str = "orbit.json";
 const TRAJECTORY: &str = "trajectory.csv";
 const EVENTS: &str = "events.csv";
 const SPECTRUM: &str = "spectrum.csv";
+const ORDERS: &str = "orders.csv";
 
 /// Number of samples in the table of the motion, and smallest number of samples per forcing period.
 pub const TABLED: usize = 2000;
@@ -58,11 +61,18 @@ static SPECTRUM_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| name
 /// Files of the figure of a motion from the start.
 static HISTORY_FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures(figure::HISTORY));
 
+/// Files of the figures of a run-up.
+static RUN_UP_FIGURES: LazyLock<[(Format, String); 3]> =
+    LazyLock::new(|| names::figures(run_up_figures::RUN_UP));
+static CAMPBELL_FIGURES: LazyLock<[(Format, String); 3]> =
+    LazyLock::new(|| names::figures(run_up_figures::CAMPBELL));
+
 /// Names of all files that an orbit may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    let alone = SPECTRUM_FIGURES.iter().chain(HISTORY_FIGURES.iter()).map(|(_, name)| name);
+    let alone = [&SPECTRUM_FIGURES, &HISTORY_FIGURES, &RUN_UP_FIGURES, &CAMPBELL_FIGURES];
+    let alone = alone.into_iter().flat_map(|figures| figures.iter()).map(|(_, name)| name);
     let figures = FIGURES.iter().map(|(.., name)| name).chain(alone);
-    [MANIFEST, JSON, TRAJECTORY, EVENTS, SPECTRUM].into_iter().chain(figures.map(String::as_str))
+    [MANIFEST, JSON, TRAJECTORY, EVENTS, SPECTRUM, ORDERS].into_iter().chain(figures.map(String::as_str))
 }
 
 /// Writes the orbit, its tables and figures unless it failed, and the manifest last. Returns the names of the files.
@@ -201,6 +211,63 @@ pub fn write_history(
     }
     let settings = json!({ "from_start": request.periods, "to_period": request.last() });
     finish(folder, model, (&request.start, settings), (elapsed, clock), files)
+}
+
+/// Writes a run-up from a start: tables, figures and manifest. Returns the names of the files.
+///
+/// # Errors
+/// [`OutputError`] if a file cannot be written.
+pub fn write_run_up(
+    folder: &Folder,
+    model: &dyn Model,
+    run: &RunUp,
+    start: &State,
+    elapsed: Duration,
+    (formats, style): (&[Format], &FigureStyle),
+) -> Result<Vec<&'static str>, OutputError> {
+    let (clock, ramp) = (Clock::now(), &run.ramp);
+    inventory::clear_for(folder, names())?;
+    let mut series = Series::of(model)?;
+    folder.replace(TRAJECTORY, |out| {
+        let mut table = csv::Writer::from_writer(out);
+        orbit_tables::write_trajectory_head(&mut table, model, Some(&ramp.name))?;
+        for (nth, (segment, history)) in (1..).zip(&run.parts) {
+            let model = ramp.model(model, segment.value)?;
+            let mut moments = orbit_tables::moments(&*model, history)?;
+            series.add(segment.value, history, &moments);
+            // The last sample of a segment is the first one of the next segment.
+            moments.pop_if(|last| nth < run.parts.len() && last.is_sample());
+            orbit_tables::write_trajectory_rows(&mut table, &*model, &moments, Some(segment.value))?;
+        }
+        Ok(table.flush()?)
+    })?;
+    folder.replace(EVENTS, |out| {
+        let mut table = csv::Writer::from_writer(out);
+        orbit_tables::write_event_head(&mut table, model, Some(&ramp.name))?;
+        for (segment, history) in &run.parts {
+            let model = ramp.model(model, segment.value)?;
+            let events = (&history.events[..], &history.slips[..]);
+            orbit_tables::write_event_rows(&mut table, &*model, events, Some(segment.value))?;
+        }
+        Ok(table.flush()?)
+    })?;
+    let mut files = vec![TRAJECTORY, EVENTS];
+    let mut figures = vec![(&RUN_UP_FIGURES, run_up_figures::draw(style, model, run, &series)?)];
+    let orders = series.orders();
+    if !orders.windows.is_empty() {
+        folder.replace(ORDERS, |out| orbit_tables::write_orders(out, &ramp.name, &series, &orders))?;
+        files.push(ORDERS);
+        figures.push((&CAMPBELL_FIGURES, run_up_figures::draw_campbell(style, model, run, &series, &orders)));
+    }
+    for (names, figure) in &figures {
+        for (format, name) in names.iter().filter(|(format, _)| formats.contains(format)) {
+            folder.replace(name, |out| write_figure(out, *format, figure))?;
+            files.push(name);
+        }
+    }
+    let settings =
+        json!({ "run_up": { "parameter": ramp.name, "from": ramp.from, "to": ramp.to, "time": ramp.time } });
+    finish(folder, model, (start, settings), (elapsed, clock), files)
 }
 
 fn write_trajectory(folder: &Folder, model: &dyn Model, orbit: &Orbit) -> Result<(), OutputError> {

@@ -21,6 +21,7 @@ mod models;
 mod orbit_tables;
 #[cfg(target_os = "linux")]
 mod power_cuts;
+mod run_up;
 #[cfg(target_os = "linux")]
 mod slurm;
 mod systems;

@@ -8,6 +8,8 @@ mod settle;
 mod start;
 mod tangents;
 
+pub(crate) use start::CarriedModes;
+
 use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Allowance, Engine, Flow, GapEvent, Observer, Remark, Stop, Sums, Work};
-use crate::machine::{MachineMotion, System};
+use crate::machine::{CarriedModes, MachineMotion, System};
 use crate::model::{Law, MOST_COORDINATES, REST, Side, State, first_four, state};
 use crate::pair::{PairMeter, PairMotion};
 
@@ -58,6 +58,44 @@ impl<'f> Trajectory<'f, 0> {
             Engine::Machine(_) => Trajectory::new(flow, law, y),
         }
     }
+
+    /// Returns what the motion hands over at phase 0 to an oscillator with other values of the parameters.
+    pub(crate) fn carried(&self) -> Carried {
+        let modes = match &self.motion {
+            Engines::Pair(_) => None,
+            Engines::Machine(motion) => Some(motion.carried()),
+        };
+        Carried { state: self.unshifted_state(), meshing: self.meshing(), modes }
+    }
+
+    /// Continues a motion at phase 0 of an oscillator that differs in the values of its parameters. Displacements and velocities stay, but a
+    /// gap at rest on a rigid wall follows the wall, and surfaces that stick follow each other. Contact that depends on a force is decided again.
+    pub(crate) fn continued(
+        flow: &'f Flow,
+        law: Law,
+        carried: &Carried,
+        observer: &mut impl Observer,
+    ) -> Self {
+        let Carried { state, meshing, modes } = carried;
+        let motion = match (flow.engine(), modes) {
+            (Engine::Pair(of), _) => {
+                Engines::Pair(PairMotion::continued(of, law, (first_four(state), *meshing), observer))
+            }
+            (Engine::Machine(system), Some(modes)) => {
+                Engines::Machine(Box::new(MachineMotion::continued(system, state, modes, observer)))
+            }
+            (Engine::Machine(_), None) => return Trajectory::new(flow, law, *state),
+        };
+        Trajectory { flow, motion }
+    }
+}
+
+/// What a motion hands over at phase 0: its state, and what the state does not tell.
+#[derive(Clone, Debug)]
+pub(crate) struct Carried {
+    state: State,
+    meshing: Option<Side>,
+    modes: Option<CarriedModes>,
 }
 
 impl<'f, const N: usize> Trajectory<'f, N> {

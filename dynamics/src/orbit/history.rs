@@ -11,7 +11,7 @@ use crate::motion::Flow;
 use crate::motion::{Allowance, Stop, Trajectory};
 
 /// Largest number of events in a window. They take about 200 MB.
-const MOST_EVENTS: u64 = 1_000_000;
+pub(super) const MOST_EVENTS: u64 = 1_000_000;
 
 /// Samples and events of a motion over consecutive forcing periods.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use super::{DomainKind, Mode, PairFlow, PairMotion, PairState, Schedule};
 use crate::model::{Contact, Law, Side};
-use crate::motion::{Allowance, Clock, Work};
+use crate::motion::{Allowance, Clock, Observer, Work};
 
 /// Distance of a gap that lies on a wall, relative to the wall's position or the scale of length.
 const START_ON_WALL: f64 = 1e-9;
@@ -29,6 +29,18 @@ impl<'f> PairMotion<'f, 0> {
             trajectory.from_wall = None;
             trajectory.pending = None;
         }
+        trajectory
+    }
+
+    /// Starts a trajectory like [`PairMotion::meshing_from`], and decides contact that depends on a force again, as where a stage begins.
+    pub(crate) fn continued(
+        flow: &'f PairFlow,
+        law: Law,
+        (y, meshing): (PairState, Option<Side>),
+        observer: &mut impl Observer,
+    ) -> Self {
+        let mut trajectory = PairMotion::meshing_from(flow, law, y, meshing);
+        trajectory.enter_stage(trajectory.stage, observer);
         trajectory
     }
 }

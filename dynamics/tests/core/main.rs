@@ -20,6 +20,7 @@ mod properties;
 mod pushing;
 mod quantities;
 mod resonance;
+mod run_up;
 mod single_stop;
 mod stages;
 mod sticking;

@@ -8,3 +8,4 @@ mod map_lines;
 pub mod orbit;
 #[cfg(test)]
 mod pages;
+pub mod run_up;

@@ -9,6 +9,7 @@ use crate::show::event_row::{self, EventRow, Place, PlaceNames};
 use crate::show::figure::orbit::gaps::{PlotGap, contacts_at_start};
 use crate::show::names::optional;
 use crate::show::orbit_spectrum::Spectrum;
+use crate::show::run_up::{Orders, Series};
 use rattlemap_dynamics::machine::{Outputs, Situation, System};
 use rattlemap_dynamics::model::{DryFriction, Model, ModelError, Oscillator, Side, State};
 use rattlemap_dynamics::motion::{Slip, SlipKind, Slips};
@@ -31,6 +32,13 @@ pub struct Moment {
     pub(crate) outputs: Outputs,
     /// The event, and `before` or `after`.
     event: Option<(EventRow, &'static str)>,
+}
+
+impl Moment {
+    /// Whether it is a sample.
+    pub(crate) fn is_sample(&self) -> bool {
+        self.event.is_none()
+    }
 }
 
 /// Returns the motion of an orbit as it was sampled from phase 0 on.
@@ -146,28 +154,62 @@ pub fn write_events(
     slips: &[SlipPoint],
 ) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
+    write_event_head(&mut table, model, None)?;
+    write_event_rows(&mut table, model, (events, slips), None)?;
+    Ok(table.flush()?)
+}
+
+/// Writes the names of the columns of `events.csv`. `last` is the name of a further column.
+pub(crate) fn write_event_head(
+    table: &mut csv::Writer<impl Write>,
+    model: &dyn Model,
+    last: Option<&str>,
+) -> Result<(), WriteError> {
     let (names, places) = (model.state_names(), PlaceNames::of(model));
     let states = ["before", "after"].into_iter();
     let states = states.flat_map(|moment| names.iter().map(move |name| format!("{moment}_{name}")));
     let head = ["kind", "side", "t", "t_mod_period"].map(str::to_owned).into_iter().chain(states);
-    let last = places.columns(None).into_iter().map(|(column, _)| column.to_owned());
-    table.write_record(head.chain(["impulse".to_owned()]).chain(last))?;
+    let places = places.columns(None).into_iter().map(|(column, _)| column.to_owned());
+    let last = last.map(str::to_owned);
+    Ok(table.write_record(head.chain(["impulse".to_owned()]).chain(places).chain(last))?)
+}
+
+/// Writes rows of `events.csv`. `last` is the number of a further column.
+pub(crate) fn write_event_rows(
+    table: &mut csv::Writer<impl Write>,
+    model: &dyn Model,
+    (events, slips): (&[Event], &[SlipPoint]),
+    last: Option<f64>,
+) -> Result<(), WriteError> {
+    let (names, places) = (model.state_names(), PlaceNames::of(model));
     for row in event_row::rows(model, events, slips) {
         let states = [&row.before, &row.after].into_iter().flat_map(|state| &state[..names.len()]);
         let numbers = [row.t, row.t_mod_period].into_iter().chain(states.copied());
         let texts = [row.kind.to_owned(), optional(row.side_code())].into_iter();
         let texts = texts.chain(numbers.map(|x| format!("{x:?}")));
         let impulse = row.impulse().map_or(String::new(), |x| format!("{x:?}"));
-        let last = places.columns(Some(row.place)).into_iter().map(|(_, name)| name.to_owned());
-        table.write_record(texts.chain([impulse]).chain(last))?;
+        let places = places.columns(Some(row.place)).into_iter().map(|(_, name)| name.to_owned());
+        let last = last.map(|x| format!("{x:?}"));
+        table.write_record(texts.chain([impulse]).chain(places).chain(last))?;
     }
-    Ok(table.flush()?)
+    Ok(())
 }
 
 /// Writes `trajectory.csv`, one row per moment. With several gaps, each has a column `domain_` with its name. The columns of `events.csv`
 /// follow, then the force of the contacts of each gap, the force of each friction element, and the signals.
 pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) -> Result<(), WriteError> {
     let mut table = csv::Writer::from_writer(out);
+    write_trajectory_head(&mut table, model, None)?;
+    write_trajectory_rows(&mut table, model, moments, None)?;
+    Ok(table.flush()?)
+}
+
+/// Writes the names of the columns of `trajectory.csv`. `further` is the name of a further column.
+pub(crate) fn write_trajectory_head(
+    table: &mut csv::Writer<impl Write>,
+    model: &dyn Model,
+    further: Option<&str>,
+) -> Result<(), WriteError> {
     let (state_names, several, places) = (model.state_names(), several_gaps(model), PlaceNames::of(model));
     let own = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
     let domains = match &several {
@@ -180,10 +222,24 @@ pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) 
     let last = names_of(None).map(|[column, _]| column).collect();
     let marks = own(&["event", "side", "moment"]);
     let head = [own(&["t", "phase"]), gaps, own(&state_names), domains, marks, last, output_columns(model)];
-    table.write_record(head.concat())?;
+    let further = further.map(str::to_owned);
+    Ok(table.write_record(head.concat().into_iter().chain(further))?)
+}
+
+/// Writes rows of `trajectory.csv`. `further` is the number of a further column.
+pub(crate) fn write_trajectory_rows(
+    table: &mut csv::Writer<impl Write>,
+    model: &dyn Model,
+    moments: &[Moment],
+    further: Option<f64>,
+) -> Result<(), WriteError> {
+    let (count, places) = (model.state_names().len(), PlaceNames::of(model));
+    let own = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let names_of =
+        |place| places.columns(place).into_iter().map(|(column, name)| [column, name].map(str::to_owned));
     for Moment { t, phase, gaps, state, domains, outputs, event } in moments {
         let numbers = [*t, *phase].into_iter().chain(gaps.concat());
-        let numbers = numbers.chain(state[..state_names.len()].iter().copied());
+        let numbers = numbers.chain(state[..count].iter().copied());
         let texts = numbers.map(|x| format!("{x:?}")).chain(own(domains));
         let mark = |(row, moment): &(EventRow, &str)| {
             [row.kind.to_owned(), optional(row.side_code()), (*moment).to_owned()]
@@ -192,8 +248,29 @@ pub fn write_trajectory(out: impl Write, model: &dyn Model, moments: &[Moment]) 
         let place = event.as_ref().map(|(row, _)| row.place);
         let texts = texts.chain(marks).chain(names_of(place).map(|[_, name]| name));
         let Outputs { contacts, friction, signals } = outputs;
-        let outputs = contacts.iter().chain(friction).chain(signals).map(|x| format!("{x:?}"));
+        let outputs =
+            contacts.iter().chain(friction).chain(signals).chain(&further).map(|x| format!("{x:?}"));
         table.write_record(texts.chain(outputs))?;
+    }
+    Ok(())
+}
+
+/// Writes `orders.csv`, one row per window and order, with the amplitude of each displacement, gap and signal.
+pub(crate) fn write_orders(
+    out: impl Write,
+    parameter: &str,
+    series: &Series,
+    orders: &Orders,
+) -> Result<(), WriteError> {
+    let mut table = csv::Writer::from_writer(out);
+    let names = series.quantities.iter().map(|quantity| quantity.name.as_str());
+    table.write_record(["t", parameter, "order"].into_iter().chain(names))?;
+    for ([t, value], amplitudes) in &orders.windows {
+        for line in 0..amplitudes[0].len() {
+            let numbers = [*t, *value, Orders::order(line)].into_iter();
+            let numbers = numbers.chain(amplitudes.iter().map(|of| of[line]));
+            table.write_record(numbers.map(|x| format!("{x:?}")))?;
+        }
     }
     Ok(table.flush()?)
 }

@@ -6,11 +6,18 @@ use crate::machine::modes::{AtRest, GapMode, Modes, Pieces, signed};
 use crate::machine::watch::Roots;
 use crate::machine::{Numbers, System};
 use crate::model::{Contact, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
-use crate::motion::{Allowance, Clock, Work};
+use crate::motion::{Allowance, Clock, Observer, Work};
 use crate::motion::{Slip, Slips};
 
 /// Rounding error of a gap that lies on a wall, relative to the terms of the gap and the wall's position.
 const GAP_ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// The modes of a motion, and the sides of its last events.
+#[derive(Clone, Debug)]
+pub(crate) struct CarriedModes {
+    modes: Modes,
+    origin: [Option<Side>; MOST_GAPS],
+}
 
 impl<'s> MachineMotion<'s> {
     /// Starts at phase 0 in the state `(x1, v1, x2, v2, ...)`.
@@ -65,7 +72,8 @@ impl<'s> MachineMotion<'s> {
     /// the modes: a gap just in front of a wall may be free or in a contact onset.
     pub fn at(&self, state: &[f64], tangents: Vec<Numbers>) -> MachineMotion<'s> {
         let mut started = MachineMotion::new(self.system, state);
-        started.take_modes_of(self);
+        started.take_modes(&self.carried());
+        started.allowance = self.allowance();
         started.set_tangents(tangents);
         started
     }
@@ -76,17 +84,36 @@ impl<'s> MachineMotion<'s> {
         's: 'g,
     {
         let mut started = MachineMotion::new(system, &self.state());
-        started.take_modes_of(self);
+        started.take_modes(&self.carried());
+        started.allowance = self.allowance();
         started.remark = started.remark.max(self.remark);
         started
     }
 
-    fn take_modes_of(&mut self, motion: &MachineMotion<'s>) {
-        let system = self.system;
-        self.allowance = motion.allowance();
-        self.origin = motion.origin;
+    /// Returns what the state does not tell about the motion.
+    pub(crate) fn carried(&self) -> CarriedModes {
+        CarriedModes { modes: self.modes, origin: self.origin }
+    }
+
+    /// Starts at phase 0 in the state and in the modes of a motion of the same model with other values of its parameters. Modes that depend on
+    /// forces are decided again, as where a stage begins.
+    pub(crate) fn continued(
+        system: &'s System,
+        state: &[f64],
+        carried: &CarriedModes,
+        observer: &mut dyn Observer,
+    ) -> MachineMotion<'s> {
+        let mut started = MachineMotion::new(system, state);
+        started.take_modes(carried);
+        started.enter_stage(started.modes.stage, observer);
+        started
+    }
+
+    fn take_modes(&mut self, carried: &CarriedModes) {
+        let (system, modes) = (self.system, &carried.modes);
+        self.origin = carried.origin;
         for gap in 0..system.gaps() {
-            let mode = motion.modes.gaps[gap];
+            let mode = modes.gaps[gap];
             let lasts = match mode {
                 GapMode::Stuck(side) => {
                     self.point[gap] = system.last_wall(gap, side).at;
@@ -99,7 +126,7 @@ impl<'s> MachineMotion<'s> {
                 (self.modes.gaps[gap], self.roots.at_wall[gap]) = (mode, None);
             }
         }
-        self.modes.slips = motion.modes.slips;
+        self.modes.slips = modes.slips;
         for (element, slip) in system.elements.iter().zip(&mut self.modes.slips) {
             let [rate, size] = element.rate_and_size(&self.point[system.n..]);
             if *slip != Slip::Stick && rate.abs() > GAP_ROUNDING * size {
@@ -108,7 +135,7 @@ impl<'s> MachineMotion<'s> {
             }
         }
         self.modes.pieces = system.pieces_at(&self.modes.slips, &self.point);
-        self.has_slid = motion.modes.slips.map(|slip| slip != Slip::Stick);
+        self.has_slid = modes.slips.map(|slip| slip != Slip::Stick);
         self.roots.from_rate = [0; MOST_FRICTION];
         system.hold(&self.modes, &mut self.point, false);
     }
