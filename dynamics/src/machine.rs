@@ -42,13 +42,13 @@ pub use motion::MachineMotion;
 pub use outputs::{Outputs, Situation};
 pub use table::{Equations, StartModes};
 
-use crate::model::{MOST_HARMONICS, STATE, State};
+use crate::model::{MOST_COORDINATES_AND_HARMONICS, STATE, State};
 
 /// Number of entries of a state.
 pub(crate) const SIZE: usize = STATE;
 
 /// Length of `a`: the state, cosine and sine of each harmonic, and 1, rounded up to a multiple of four for SIMD registers.
-pub(crate) const WIDTH: usize = (SIZE + 2 * (MOST_HARMONICS + 1) + 1).next_multiple_of(4);
+pub(crate) const WIDTH: usize = (2 * MOST_COORDINATES_AND_HARMONICS + 1).next_multiple_of(4);
 
 /// Rounding error of a sum, relative to the size of its terms.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;

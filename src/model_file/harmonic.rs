@@ -40,6 +40,13 @@ pub(super) fn read(
         if let Value::Integer(1) = field.node.value {
             return Err(field.conflict("order 1 is `force` and `force_sin` in [motion]"));
         }
+        if let Value::Float(order) = field.node.value
+            && (2.0 * order).fract() == 0.0
+        {
+            return Err(field.conflict(
+                "an order is a whole number; for half orders, halve `frequency` and double all orders: order 1, `force`, becomes order 2",
+            ));
+        }
         let order = field.whole(2..=HIGHEST_ORDER)?;
         if harmonics.iter().any(|other| other.order == order) {
             return Err(field

@@ -455,6 +455,7 @@ fn errors_in_harmonics_name_the_field() {
         r#"
 order = 2 | order = 1 | m.toml:35:9: `harmonic.1.order = 1` does not fit: order 1 is `force` and `force_sin` in [motion]
 order = 2 | order = 65 | `harmonic.1.order = 65` is out of range: it must be a whole number from 2 to 64
+order = 2 | order = 1.5 | m.toml:35:9: `harmonic.1.order = 1.5` does not fit: an order is a whole number; for half orders, halve `frequency` and double all orders: order 1, `force`, becomes order 2
 order = 2 | order = "2" | `harmonic.1.order = "2"` has the wrong type: it must be a whole number from 2 to 64
 order = 2 | order = 4 | `harmonic.1.order = 4` does not fit: there is already a harmonic of this order
 order = 2 | | `harmonic.1.order` is missing; write order = 2 for twice the frequency
@@ -468,17 +469,17 @@ cos = ["F/s"] | cos = ["log(-1)"] | m.toml:31:7: `harmonic.0.cos = ["log(-1)"]` 
 gap = [1] | gap = [1]\nharmonic = 2 | unknown field `motion.harmonic = 2`
 "#,
     );
-    let many: String = (2..10).map(|order| format!("[[harmonic]]\norder = {order}\ncos = [1]\n")).collect();
+    let many: String = (2..18).map(|order| format!("[[harmonic]]\norder = {order}\ncos = [1]\n")).collect();
     check_refusals(
         ONE_DEGREE,
         &format!(
-            "[motion] | {}[motion] | `harmonic = 8 tables` is out of range: it must be at most 7 tables",
+            "[motion] | {}[motion] | `harmonic = 16 tables` is out of range: it must be at most 15 tables",
             many.replace('\n', "\\n")
         ),
     );
     check_refusals(
         ONE_DEGREE,
-        "[motion] | [harmonic]\\norder = 2\\n[motion] | `harmonic = { ... }` has the wrong type: it must be at most 7 tables, [[harmonic]]",
+        "[motion] | [harmonic]\\norder = 2\\n[motion] | `harmonic = { ... }` has the wrong type: it must be at most 15 tables, [[harmonic]]",
     );
 }
 

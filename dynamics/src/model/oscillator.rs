@@ -23,7 +23,10 @@ use super::{Contact, Law, OscillatorError, Side, State, pair, state};
 pub const HIGHEST_ORDER: u32 = 64;
 
 /// Largest number of harmonics beside the first.
-pub const MOST_HARMONICS: usize = 7;
+pub const MOST_HARMONICS: usize = 15;
+
+/// Largest number of coordinates and harmonics together. It bounds the points of the general engine.
+pub const MOST_COORDINATES_AND_HARMONICS: usize = 17;
 
 /// Largest number of elements with dry friction.
 pub const MOST_FRICTION: usize = 2;
@@ -650,8 +653,9 @@ impl Oscillator {
             symmetric("stiffness", &forces.stiffness)?;
         }
         let count = self.drives.len();
-        let few = "at most 7, beside the first";
-        require(count <= MOST_HARMONICS + 1, || "the number of harmonics".to_owned(), count as f64, few)?;
+        let most = (MOST_HARMONICS + 1).min(MOST_COORDINATES_AND_HARMONICS - n);
+        let few = "at most 16 with the first, and at most 17 together with the number of coordinates";
+        require(count <= most, || "harmonics".to_owned(), count as f64, few)?;
         for pair in self.drives.windows(2) {
             let (order, increasing) = (f64::from(pair[1].order), "above those before it");
             require(pair[0].order < pair[1].order, || "order of a harmonic".to_owned(), order, increasing)?;

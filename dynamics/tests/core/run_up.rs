@@ -14,7 +14,7 @@ use rattlemap_dynamics::orbit::{EventKind, History, history, run_up};
 const ZETA: f64 = 0.02;
 
 /// Returns `x'' + 2 ZETA x' + x = cos omega t + load` with a rigid floor, as a pair or as a machine.
-fn above(floor: f64, omega: f64, load: f64, is_machine: bool) -> Oscillator {
+pub(crate) fn above(floor: f64, omega: f64, load: f64, is_machine: bool) -> Oscillator {
     let (matrix, vector) = (|x| DMatrix::from_element(1, 1, x), |x| DVector::from_element(1, x));
     let wall = Wall {
         at: floor,

@@ -1,12 +1,14 @@
 //! Stages and harmonics of the force, against closed forms and equivalent oscillators.
 
 use crate::common::pairs::AsPair;
+use nalgebra::{Complex, DVector};
 use std::f64::consts::TAU;
 
 use crate::common::linear::{Linear, invariants, product, with_wall};
 use crate::common::{BUDGET, REST, near, paper};
+use crate::run_up::above;
 use rattlemap_dynamics::model::{
-    Contact, Domain, Harmonic, Law, NonImpacting, Pair, Side, Stage, State, state,
+    Contact, Domain, Drive, Harmonic, Law, NonImpacting, Pair, Side, Stage, State, state,
 };
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{GapEvent, Trajectory};
@@ -207,4 +209,43 @@ fn the_steady_motion_is_the_sum_of_the_responses_to_all_harmonics() {
     assert!(near(steady[0], exact[0], 1e-14) && near(steady[1], exact[1], 1e-14), "{steady:?} {exact:?}");
     let moved = after(&oscillator, LAW, state(&[exact[0], exact[1], 0.0, 0.0]), 1);
     assert!(near(moved[0], exact[0], 1e-13) && near(moved[1], exact[1], 1e-13), "{moved:?} {exact:?}");
+}
+
+/// The steady response to sixteen harmonics is the sum of sixteen closed forms, on both engines.
+#[test]
+fn sixteen_harmonics_act_like_the_sum_of_their_responses() {
+    let omega = 0.7;
+    let steady = |phase: f64| {
+        let of = |order: u32| {
+            let rate = omega * f64::from(order);
+            let response = Complex::from(1.0) / Complex::new(1.0 - rate * rate, 0.04 * rate);
+            let wave = response * Complex::from_polar(1.0 / f64::from(order), f64::from(order) * phase);
+            [wave.re, -rate * wave.im]
+        };
+        (1..=16).map(of).fold([0.0; 2], |[x, v], [dx, dv]| [x + dx, v + dv])
+    };
+    for is_machine in [false, true] {
+        let mut oscillator = above(-100.0, omega, 0.0, is_machine);
+        let drive = |order: u32| Drive {
+            order,
+            cos: DVector::from_element(1, 1.0 / f64::from(order)),
+            sin: DVector::zeros(1),
+        };
+        oscillator.drives = (1..=16).map(drive).collect();
+        oscillator.validate().unwrap();
+        let flow = Flow::new(&oscillator);
+        let mut trajectory = Trajectory::<0>::new(&flow, LAW, state(&steady(0.0)));
+        for n in 1..160 {
+            let phase = 0.04 * f64::from(n);
+            trajectory.advance_to(phase / omega, &mut ()).unwrap();
+            let (found, [x, v]) = (trajectory.state(), steady(phase));
+            assert!(
+                (found[0] - x).abs() < 1e-12 && (found[1] - v).abs() < 1e-12,
+                "{phase}: {found:?}, {x} {v}"
+            );
+        }
+        oscillator.drives.push(drive(17));
+        let error = oscillator.validate().unwrap_err().to_string();
+        assert!(error.starts_with("harmonics = 17: it must be at most 16"), "{error}");
+    }
 }

@@ -11,13 +11,13 @@ use std::rc::Rc;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use rattlemap_dynamics::model::{
-    Contact, Curve, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS,
-    MOST_HARMONICS, MOST_SPRINGS, NonlinearSpring, Oscillator, REST, Restitution, Side, Spring, State,
-    Timing, Wall,
+    Contact, Curve, Drive, DryFriction, Forces, GapRow, MOST_COORDINATES, MOST_COORDINATES_AND_HARMONICS,
+    MOST_FRICTION, MOST_GAPS, MOST_SPRINGS, NonlinearSpring, Oscillator, REST, Restitution, Side, Spring,
+    State, Timing, Wall,
 };
 
 /// Largest number of entries of a point.
-pub(super) const WIDTH: usize = 2 * MOST_COORDINATES + 2 * (MOST_HARMONICS + 1) + 1;
+pub(super) const WIDTH: usize = 2 * MOST_COORDINATES_AND_HARMONICS + 1;
 
 /// Coordinates and rates, of which the first `2 n` are in use.
 pub(super) type Numbers = [f64; 2 * MOST_COORDINATES];
