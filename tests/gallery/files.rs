@@ -62,7 +62,7 @@ fn model_files_define_the_models_of_the_closed_forms() {
     agrees("energy-sink", &[("d", 0.08)], clearance::Damper { clearance: 0.16, ..clearance::SINK }.pair());
     let sets = [("swing", loose_gear::swing(1.5)), ("backlash", 2e-4), ("e", 0.3)];
     agrees("loose-gear", &sets, walled(loose_gear::gear(1.5, 2e-4, 0.3)));
-    // The others are the gear pair, which is compared with the paper, four models with stages, three with dry friction, two whose
-    // closed forms use the model file, clutch and backlash, and three machines.
-    assert_eq!(FileModel::all_built_in().len(), 24);
+    // The others are the gear pair, which is compared with the paper, four models with stages, six with dry friction,
+    // nonlinear springs or force laws, two whose closed forms use the model file, clutch and backlash, and three machines.
+    assert_eq!(FileModel::all_built_in().len(), 27);
 }
