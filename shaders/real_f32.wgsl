@@ -24,6 +24,10 @@ const POLYNOMIAL_ROUNDING: Real = 1e-6;
 const NARROWEST: Real = 1e-6;
 const MOST_HALVINGS: u32 = 48u;
 const ROOT_STEPS: u32 = 30u;
+// Machines: relative change of speeds and accelerations for derivatives of a duration, and largest number of flights that are added one by
+// one (machine/chatter.wgsl).
+const DIFFERENCE: Real = 3e-3;
+const MOST_FLIGHTS: u32 = 16u;
 // States of this size count as not finite.
 const HUGE: Real = 1e15;
 

@@ -14,6 +14,8 @@ const POLYNOMIAL_ROUNDING: Real = 2e-15;
 const NARROWEST: Real = 1e-14;
 const MOST_HALVINGS: u32 = 96u;
 const ROOT_STEPS: u32 = 60u;
+const DIFFERENCE: Real = 1e-4;
+const MOST_FLIGHTS: u32 = 128u;
 const HUGE: Real = 1e150;
 
 // Compares the bits of an f32, because drivers' fast arithmetic ignores NaN.

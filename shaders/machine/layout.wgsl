@@ -15,6 +15,8 @@ struct Flow {
     length: Real,
     speed: Real,
     escape: Real,
+    // Time in which the fastest harmonic turns by one radian.
+    radian: Real,
     // Contact-free motion. Twice the energy of the transient below which no contact follows, negative if no transient is small enough;
     // growth of the transient per period, in octaves; steady state at phase 0.
     contact_free_energy: Real,

@@ -97,7 +97,7 @@ fn conclude_motion() {
 }
 
 fn fly_to_stop_phase() -> bool {
-    while tally.status == STATUS_OK && iterations < settings.iterations {
+    while tally.status == STATUS_OK && (iterations < settings.iterations || leaving_gap < GAPS) {
         if step() {
             return true;
         }

@@ -19,6 +19,7 @@ const ENDS_PUSH: u32 = 7u; // a rigid wall would have to pull
 const ENDS_SLIDING: u32 = 8u; // a sliding rate vanishes
 const BEGINS_SLIDING: u32 = 9u; // a holding force reaches its limit for sliding in a direction
 const BEGINS_STAGE: u32 = 10u; // the stage of the forces changes
+const ENDS_SERIES: u32 = 11u; // the limit of a series of impacts
 
 // A possible event. `index`: its gap or its element with friction. `side`: a side, or the mode of friction that follows. `line`: a function
 // that is positive before the event and zero at the event. `order`: the order of this function's root at the start of the step; 0 without a
@@ -92,7 +93,7 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
         let i = (number_of_watch - WATCHES_PER_GAP * GAPS) / 2u;
         let is_first = (number_of_watch - WATCHES_PER_GAP * GAPS) % 2u == 0u;
         found.index = i;
-        if i >= shape.elements {
+        if i >= shape.elements || (held_gap < GAPS && ((rubs >> i) & 1u) == 1u) {
             return found;
         }
         if slips[i] != STICKS {
@@ -115,6 +116,13 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
     let side = contact_of(mode);
     found.index = gap;
     found.side = side;
+    if gap == held_gap {
+        if nth == 0u {
+            found.kind = ENDS_PRESSING;
+            found.line = row_line(acceleration_row(domain, gap), sign_of(leaving_side));
+        }
+        return found;
+    }
     if is_stuck(mode) {
         if nth == 0u && has_push(domain, gap) {
             found.kind = ENDS_PUSH;
@@ -169,11 +177,11 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
     return found;
 }
 
-// Share of a grid step that is left until the stage changes or the grid step ends.
+// Steps of the grid until the stage changes or the lane must stop.
 fn steps_to_stop() -> Real {
-    var stop: Real = 1.0;
-    if is_change_next() {
-        stop = change_theta();
+    var stop = Real(next_stop_phase() - tally.step);
+    if tally.next_change < shape.changes && change_step() >= tally.step {
+        stop = min(stop, Real(change_step() - tally.step) + change_theta());
     }
     return max(stop - motion.theta, Real(0.0));
 }
@@ -188,6 +196,16 @@ fn change_theta() -> Real {
 
 // Takes one step to the first event, or as far as the series or the grid allow. Returns whether the step ends at a stop phase.
 fn step() -> bool {
+    let domain = present_domain();
+    var time_of_rest: Real = 0.0;
+    if leaving_gap < GAPS {
+        time_of_rest = begin_rest(domain);
+        leaving_gap = GAPS;
+        if time_of_rest == 0.0 {
+            // The dispatch may end here.
+            return false;
+        }
+    }
     tally.passes_in_period += 1u;
     if COLUMNS && (slid & NEW_COLUMNS) != 0u {
         slid ^= NEW_COLUMNS;
@@ -195,9 +213,8 @@ fn step() -> bool {
             set_tangent(n, constrained(tangent(n)));
         }
     }
-    let domain = present_domain();
-    let remaining = steps_to_stop() * flow.h;
-    let h = min(unit_of(domain), remaining);
+    let remaining = min(steps_to_stop(), 1.0 - motion.theta) * flow.h;
+    let h = select(min(unit_of(domain), remaining), time_of_rest, time_of_rest > 0.0);
     load_point(motion.q);
     for (var i = 0u; i < shape.width; i++) {
         sizes[i] = abs(series[i]);
@@ -225,8 +242,19 @@ fn step() -> bool {
             share = fall;
             first = candidate;
         } else if fall == NO_ROOT && touches {
-            note_touch(candidate);
+            if held_gap < GAPS {
+                first = candidate;
+            } else {
+                note_touch(candidate);
+            }
         }
+    }
+    if held_gap < GAPS {
+        if first.kind != ENDS_NOTHING {
+            continue_series();
+            return false;
+        }
+        first = Watch(ENDS_SERIES, held_gap, leaving_side, row_line(0u, 0.0), 0u);
     }
     if share > 0.0 {
         advance(domain, share, share * h);
@@ -277,15 +305,26 @@ fn advance(domain: u32, share: Real, time: Real) {
     motion.q = state_after(share);
     if VECTORS > 0u {
         for (var i = 0u; i < VECTORS; i++) {
-            load_vector(tangent(i));
+            var u = tangent(i);
+            if held_gap < GAPS {
+                u = stopped_tangent(i, domain);
+            }
+            load_vector(u);
             expand(domain, time);
             set_tangent(i, state_after(1.0));
         }
-        check_range();
+        if held_gap == GAPS {
+            check_range();
+        }
     }
     let part = time / flow.h;
+    motion.theta += part;
+    if held_gap < GAPS && motion.theta >= 1.0 {
+        motion.theta -= 1.0;
+        tally.step += 1u;
+    }
     // Only a step without an event reaches the end of the grid step.
-    motion.theta = min(motion.theta + part, 1.0 - 2.0 * ULP);
+    motion.theta = min(motion.theta, 1.0 - 2.0 * ULP);
     var is_in_contact = false;
     for (var gap = 0u; gap < GAPS; gap++) {
         is_in_contact = is_in_contact || contact_of(contact_mode(gap)) != SIDE_NONE;
@@ -397,22 +436,28 @@ fn cross(event: Watch, domain: u32) {
     var rate: Real = 0.0;
     if VECTORS > 0u {
         before = field(domain);
-        rate = value_of(event.line, 1u);
+        rate = select(value_of(event.line, 1u), Real(-1.0), event.kind == ENDS_SERIES);
     }
     kick_factor = 0.0;
     act(event);
     count_notes();
     if VECTORS > 0u && event.kind != BEGINS_STAGE {
-        saltate(event.line, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), before, rate,
-            event.kind == ENDS_AT_WALL || event.kind == LEAVES);
+        saltate(event, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), before, rate);
+    }
+    let has_left = event.kind == ENDS_AT_WALL && kick_factor != 0.0 && gap_modes[event.index] == before_last(event.index, event.side);
+    if has_left && resting_gaps() == held_gaps {
+        leaving_gap = event.index;
+        leaving_side = event.side;
     }
 }
 
 // Applies `S u = R u + (f+ - R f-) (n . u) / (n . f-)` to every tangent vector, and projects it to the constraints.
-fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) {
+fn saltate(event: Watch, least: Real, before: State, rate: Real) {
     var change = field(present_domain());
+    leaves = change;
     var carried = jump(before);
     let inverse = select(1.0 / rate, Real(0.0), abs(rate) <= least);
+    let is_passed = event.kind == ENDS_AT_WALL || event.kind == LEAVES;
     if abs(rate) <= least && (kick_factor != 0.0 || !is_passed) {
         tally.grazes += 1u;
     }
@@ -422,7 +467,7 @@ fn saltate(line: Line, least: Real, before: State, rate: Real, is_passed: bool) 
     for (var n = 0u; n < VECTORS; n++) {
         let u = tangent(n);
         load_vector(u);
-        let along = value_of(line, 0u);
+        let along = select(value_of(event.line, 0u), late[n], event.kind == ENDS_SERIES);
         var v = jump(u);
         for (var i = 0u; i < shape.dim; i++) {
             v[i] += change[i] * along;
@@ -438,6 +483,8 @@ fn act(event: Watch) {
     var exempt_element = ELEMENTS;
     var reached = SIDE_NONE;
     var stopped = ELEMENTS;
+    has_outcome = false;
+    held_gap = GAPS;
     switch event.kind {
         case ENDS_AT_WALL: {
             if gap_modes[i] >= ONSET {
@@ -487,6 +534,10 @@ fn act(event: Watch) {
             begin_sliding(i, event.side);
             exempt_element = i;
         }
+        case ENDS_SERIES: {
+            end_series(i, event.side);
+            has_outcome = true;
+        }
         default: {
             // Modes that depend on forces are decided again in the stage that begins.
             stage = u32(table[shape.schedule + 3u * tally.next_change + 2u]);
@@ -495,6 +546,16 @@ fn act(event: Watch) {
     }
     if reached != SIDE_NONE {
         reach(i, reached);
+    }
+    if has_outcome {
+        gap_modes[i] = tried_gaps[i];
+        change_modes(ELEMENTS);
+        if is_stuck(gap_modes[i]) {
+            wall_side[i] = SIDE_NONE;
+        } else {
+            let side = select(event.side, reached, reached != SIDE_NONE);
+            leave(i, select(side, 1u - side, gap_modes[i] >= PRESSED));
+        }
     }
     if event.kind != ENDS_ONSET {
         settle(exempt_gap, exempt_element, stopped);
@@ -654,11 +715,7 @@ fn impact(gap: u32, side: u32) {
     let e = law[0];
     let leaving = e * approach;
     let is_rigid = last_kind(gap, side) == LAST_RIGID;
-    let own = laws[cell.law_index][2u * gap + side];
-    let mesh_speed = own[3];
-    let is_endless = own[1] == 0.0 && mesh_speed <= NO_THRESHOLD * flow.speed;
-    // Speed of the gap at the end of a flight, relative to its leaving speed. Friction along the gap makes it less than 1.
-    var ratio: Real = 1.0;
+    let mesh_speed = laws[cell.law_index][2u * gap + side][3];
     var before: State = motion.q;
     var kept = 0u;
     var lasts = false;
@@ -717,13 +774,6 @@ fn impact(gap: u32, side: u32) {
                 pressing = value;
                 load_point(q);
                 is_slow = leaving <= max(mesh_speed, lowest_speed(domain, gap));
-                let back = reversed_slips(q, gap);
-                let outward = sign_of(side) * product(acceleration_row(domain, gap), 0u);
-                let inward = sign_of(side) * product(acceleration_row(domain_of(tried_gaps, back), gap), 0u);
-                ratio = sqrt(max(inward, Real(0.0)) / outward);
-                // The rest of a series of impacts is short after the impact before, whose leaving speed was `approach / ratio`.
-                let is_short = 2.0 * approach < ratio * CLOSING_ANGLE * number(domain) * (1.0 - e) * outward;
-                is_slow = is_slow || is_short && is_endless && !varies && ratio > 0.0;
                 if !is_slow || is_rigid || !(pressing > 0.0) {
                     break;
                 }
@@ -750,13 +800,14 @@ fn impact(gap: u32, side: u32) {
             break;
         }
     }
+    held_gaps = select(UNSURE, held_gaps, kept == 0u);
     if !lasts && !(pressing > 0.0) && approach < GRAZING_SPEED * flow.speed {
         tally.grazes += 1u;
     }
-    // The rest of a series is one flight of the same duration and momentum.
+    // The rest of a series that was not replaced by its limit is one flight of the same duration and momentum.
     var longer: Real = 1.0;
-    if lasts && !is_rigid && leaving > mesh_speed && e < 1.0 && ratio > 0.0 {
-        longer = (1.0 + 1.0 / ratio) / (1.0 - e * ratio);
+    if lasts && !is_rigid && leaving > mesh_speed && e < 1.0 {
+        longer = 2.0 / (1.0 - e);
         for (var i = 0u; i < shape.coordinates; i++) {
             next[2u * i + 1u] -= sign_of(side) * kick[i] * (longer - 1.0) * leaving;
         }
@@ -769,14 +820,11 @@ fn impact(gap: u32, side: u32) {
     if !lasts {
         tally.impacts += 1u;
     }
-    gap_modes[gap] = tried_gaps[gap];
-    change_modes(ELEMENTS);
-    if is_stuck(gap_modes[gap]) {
-        wall_side[gap] = SIDE_NONE;
-    } else {
-        leave(gap, select(side, 1u - side, gap_modes[gap] >= PRESSED));
-    }
+    has_outcome = true;
 }
+
+// Whether an impact or a series of impacts has ended with the tried modes, and they are not yet entered.
+var<private> has_outcome: bool;
 
 // Computes the changes of all rates by an impulse that changes the gap's rate by 1. Returns the bit mask of the resting gaps that leave
 // their rigid walls. Other resting gaps stay, because their walls push; gaps in `kept` stay in any case.
@@ -826,9 +874,11 @@ fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
             kick[i] = moved / own;
         }
         kick[gap] = 1.0;
+        held_gaps = 0u;
         var fits = true;
         for (var k = 0u; k < count_of_held; k++) {
             kick[held[k]] = 0.0;
+            held_gaps |= 1u << held[k];
             let is_kept_here = ((kept >> held[k]) & 1u) == 1u;
             let at = (gap_modes[held[k]] + 1u) % 2u;
             // The wall pushes the gap away, so all rates change by `-side kick`.
@@ -898,38 +948,6 @@ fn slide_after_jump(q: State, jumps: bool, gap: u32, stopped: u32) -> bool {
         }
     }
     return choose(q, false);
-}
-
-// Whether an element reverses in some flights of a series of impacts only.
-var<private> varies: bool;
-
-// Returns the slips in the second half of the flights of a series of impacts, which friction along the gap slows down.
-fn reversed_slips(q: State, gap: u32) -> array<u32, ELEMENT_SLOTS> {
-    var back = tried_slips;
-    varies = false;
-    for (var i = 0u; i < ELEMENTS; i++) {
-        if i >= shape.elements {
-            continue;
-        }
-        let row = AT_ELEMENTS + i * (WIDTH + 1u);
-        var along: Real = 0.0;
-        var size_of_move: Real = 0.0;
-        var rate = number(row + WIDTH - 1u);
-        var size = abs(rate);
-        for (var j = 0u; j < shape.coordinates; j++) {
-            let factor = number(row + 2u * j + 1u);
-            let stopped = q[2u * j + 1u] - kick[j] * q[2u * gap + 1u];
-            along += factor * kick[j];
-            size_of_move += abs(factor * kick[j]);
-            rate += factor * stopped;
-            size += abs(factor * stopped);
-        }
-        if abs(along) > ROUNDING * size_of_move && abs(rate) <= 2.0 * abs(along * q[2u * gap + 1u]) {
-            varies = varies || abs(rate) > ROUNDING * size;
-            back[i] = select(back[i], FORWARD + BACKWARD - back[i], back[i] != STICKS);
-        }
-    }
-    return back;
 }
 
 // Lists all elements at rest: gaps on rigid walls, and elements that stick.

@@ -163,6 +163,13 @@ fn differentiate(domain: u32, k: u32, factor: Real) {
         series[to_term + 2u * i] = factor * series[from_term + 2u * i + 1u];
         series[to_term + 2u * i + 1u] = factor * product(acceleration_row(domain, i), k);
     }
+    if held_gap < GAPS {
+        // The wall's force keeps the gap at rest.
+        let excess = series[to_term + 2u * held_gap + 1u];
+        for (var i = 0u; i < shape.coordinates; i++) {
+            series[to_term + 2u * i + 1u] -= kick[i] * excess;
+        }
+    }
     for (var m = 0u; m < HARMONICS; m++) {
         let turn = factor * Real(shape.orders[m]) * flow.omega;
         let at = DIM + 2u * m;

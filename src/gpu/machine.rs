@@ -15,7 +15,7 @@ use rattlemap_dynamics::model::{Contact, NonImpacting, Oscillator, STATE, Side, 
 pub(super) const MOST_DOMAINS: usize = 4096;
 
 /// Sizes of a flow, of its shape and of a law in the shader.
-pub(super) const FLOW: usize = 7 + STATE;
+pub(super) const FLOW: usize = 8 + STATE;
 pub(super) const SHAPE: usize = 31;
 pub(super) const LAW: usize = 24;
 
@@ -223,14 +223,15 @@ impl MachineConstants {
     pub(super) fn flow(&self) -> [f64; FLOW] {
         let (length, speed, escape) = self.system.units();
         let escape = if escape.is_finite() { escape } else { -1.0 };
-        let omega = self.system.machine().omega;
+        let (omega, order) = (self.system.machine().omega, self.system.machine().highest_order());
         let mut flow = [0.0; FLOW];
-        flow[..7].copy_from_slice(&[
+        flow[..8].copy_from_slice(&[
             omega,
             self.period() / f64::from(self.steps),
             length,
             speed,
             escape,
+            1.0 / (omega * f64::from(order)),
             -1.0,
             0.0,
         ]);
@@ -238,9 +239,9 @@ impl MachineConstants {
         // Lanes in single precision cannot tell whether a body is at rest, so motions that require this are excluded.
         if let Some(motion) = motion.filter(|motion| motion.resting().is_none()) {
             // Without walls the limit of the energy is infinite.
-            flow[5] = motion.reach().min(LARGEST_ENERGY);
-            flow[6] = motion.exponent() * self.period() / std::f64::consts::LN_2;
-            flow[7..].copy_from_slice(&self.system.listed_state(&motion.steady()));
+            flow[6] = motion.reach().min(LARGEST_ENERGY);
+            flow[7] = motion.exponent() * self.period() / std::f64::consts::LN_2;
+            flow[8..].copy_from_slice(&self.system.listed_state(&motion.steady()));
         }
         flow
     }

@@ -107,6 +107,7 @@ const MACHINE: &str = concat!(
     include_str!("../../shaders/machine/root.wgsl"),
     include_str!("../../shaders/machine/modes.wgsl"),
     include_str!("../../shaders/machine/motion.wgsl"),
+    include_str!("../../shaders/machine/chatter.wgsl"),
     include_str!("../../shaders/machine/machine.wgsl"),
 );
 
