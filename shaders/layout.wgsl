@@ -134,7 +134,7 @@ struct TallyNow {
     next_change: u32,
     // 1 if the lane is at a stop phase and has not been observed there.
     at_stop: u32,
-    // The present interval between walls (pair/intervals.wgsl).
+    // The present interval between walls (pair/intervals.wgsl). Machines: 1 once two gaps have reached their walls at the same time.
     interval: u32,
 }
 

@@ -40,6 +40,10 @@ fn conclude(@builtin(global_invocation_id) id: vec3<u32>) {
         if is_handed_over() {
             finding.valid |= VALID_OPEN;
         }
+        // Motion without contact, which is not read as a cycle, has forgotten the tie.
+        if is_tied() && (search.cycle == 0u || search.has_read == 1u) {
+            finding.valid |= VALID_TIED;
+        }
         if search.cycle > 0u {
             read_cycle(&reading, &finding);
         } else if EXPONENT && search.blocks > 1u {

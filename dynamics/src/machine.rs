@@ -38,7 +38,7 @@ pub use domains::System;
 pub use frame::Frame;
 pub use impact::LOWEST_FLIGHT;
 pub(crate) use motion::CarriedModes;
-pub use motion::MachineMotion;
+pub use motion::{MachineMotion, TIE};
 pub use outputs::{Outputs, Situation};
 pub use table::{Equations, StartModes};
 

@@ -162,6 +162,11 @@ fn contact_free_growth() -> Real {
     return flow.transient_growth;
 }
 
+// Whether two gaps have reached their walls at the same time, so that their order in the model decided the motion.
+fn is_tied() -> bool {
+    return tally.interval == 1u;
+}
+
 // Whether the motion is away from all walls, and no force or rate is at its limit.
 fn is_away_from_roots() -> bool {
     var is_away = true;

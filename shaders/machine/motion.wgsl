@@ -238,7 +238,9 @@ fn step() -> bool {
             order = 1u;
         }
         let fall = first_fall(order, size);
-        if fall < share || (fall <= 1.0 && first.kind == ENDS_NOTHING) {
+        // Among gaps that reach their walls together, the first one in the model has its event first.
+        let may_tie = candidate.kind == ENDS_AT_WALL && first.kind == ENDS_AT_WALL && candidate.index != first.index && first.order == 0u;
+        if fall < share - select(Real(0.0), time_of_tie() / h, may_tie) || (fall <= 1.0 && first.kind == ENDS_NOTHING) {
             share = fall;
             first = candidate;
         } else if fall == NO_ROOT && touches {
@@ -801,6 +803,9 @@ fn impact(gap: u32, side: u32) {
         }
     }
     held_gaps = select(UNSURE, held_gaps, kept == 0u);
+    if is_tied_with_another(gap) {
+        tally.interval = 1u;
+    }
     if !lasts && !(pressing > 0.0) && approach < GRAZING_SPEED * flow.speed {
         tally.grazes += 1u;
     }
@@ -821,6 +826,33 @@ fn impact(gap: u32, side: u32) {
         tally.impacts += 1u;
     }
     has_outcome = true;
+}
+
+// Whether another gap is about to have an impact, too, and the impact of the first gap changes its rate.
+fn is_tied_with_another(gap: u32) -> bool {
+    for (var other = 0u; other < GAPS; other++) {
+        let rate = rate_of_gap(other);
+        let side = select(SIDE_LEFT, SIDE_RIGHT, rate > 0.0);
+        let wall = wall_ahead(other, side);
+        // A gap in the last flights of a series of impacts is always near its wall.
+        let is_slow = abs(rate) <= SLOWEST_TIE * TIE * flow.speed;
+        if other == gap || is_slow || wall.y == NO_WALL || wall.x != side || wall.y < passable(other, side) {
+            continue;
+        }
+        let is_coupled = abs(mobility(gap, other)) > ROUNDING * sqrt(mobility(gap, gap) * mobility(other, other));
+        if is_coupled && abs(wall_at(other, side, wall.y) - motion.q[2u * other]) <= time_of_tie() * abs(rate) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// Speed of a gap, in units of TIE and of the scale of speed, above which its flights last hundreds of times as long as a tie.
+const SLOWEST_TIE: Real = 1000.0;
+
+// Time between two impacts within which their order is not known.
+fn time_of_tie() -> Real {
+    return TIE * flow.h * Real(shape.steps);
 }
 
 // Whether an impact or a series of impacts has ended with the tried modes, and they are not yet entered.

@@ -110,6 +110,10 @@ fn beyond(to: State) -> Real {
 }
 
 // Whether Newton's method may put the lane at `to`. In the contact onset the gap is in front of its wall.
+fn is_tied() -> bool {
+    return false;
+}
+
 fn may_place(to: State) -> bool {
     let leaves_onset = is_onset() && !(beyond(to) > 0.0);
     return !leaves_onset && tally.order == 0u;

@@ -6,6 +6,7 @@ use super::layout::{
     symbols_per_number,
 };
 use super::measured;
+use crate::record::classify::mark_tied;
 use crate::record::{Record, SymbolCode, joined, measures, valid};
 use rattlemap_dynamics::orbit::Quantities;
 use rattlemap_dynamics::word::Word;
@@ -75,6 +76,12 @@ fn record(constants: Option<&Constants>, reading: &Reading, finding: &Finding) -
         mesh_fraction: reading.mesh_fraction,
         ..Record::default()
     };
+    if finding.valid & valid::TIED != 0 {
+        mark_tied(&mut record);
+    }
+    if finding.valid & (valid::OPEN | valid::NEAR_STROBE) == 0 {
+        record.valid &= !valid::TIED;
+    }
     let is_valid = |bits: u32| finding.valid & bits != 0;
     if is_valid(valid::STROBE) {
         record.strobe = constants.strobe(&reading.strobe).into();

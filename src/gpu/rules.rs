@@ -1,7 +1,7 @@
 //! Rules by which lanes judge their motion. Shaders are compiled with these numbers; validation also uses them.
 
 use super::precision::Precision;
-use rattlemap_dynamics::machine::LOWEST_FLIGHT;
+use rattlemap_dynamics::machine::{LOWEST_FLIGHT, TIE};
 use rattlemap_dynamics::motion::{CLOSING_ANGLE, GRAZING_SPEED, NO_SPEED, NO_THRESHOLD};
 use rattlemap_dynamics::orbit::{
     BRANCH_CYCLES, CHAOS_ERRORS, ESCAPE_GROWTH, LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_SERIES,
@@ -74,6 +74,14 @@ pub(crate) const fn on_strobe(precision: Precision) -> f64 {
     }
 }
 
+/// Returns the time between two impacts, in forcing periods, within which their order is not known.
+const fn tie(precision: Precision) -> f64 {
+    match precision {
+        Precision::F32 => 1e-6,
+        Precision::F64 => TIE,
+    }
+}
+
 /// Returns the scatter of a settled lane's strobes by rounding, relative to the motion, without amplification.
 pub(crate) const fn noise(precision: Precision) -> f64 {
     match precision {
@@ -134,6 +142,7 @@ pub(super) fn declarations(precision: Precision) -> String {
         ("LINEAR", LINEAR_TOLERANCE),
         ("ON_STROBE", on_strobe),
         ("NEAR_STROBE", NEAR_STROBE_TURNS),
+        ("TIE", tie(precision)),
     ];
     let count = |(name, value): (&str, u32)| format!("const {name}: u32 = {value}u;\n");
     let number =

@@ -234,7 +234,7 @@ impl Variant {
 }
 
 /// The records' validity bits, by their names in the shader.
-const VALID: [(&str, u32); 11] = [
+const VALID: [(&str, u32); 12] = [
     ("PERIOD", valid::PERIOD),
     ("LYAPUNOV", valid::LYAPUNOV),
     ("IMPACTS", valid::IMPACTS),
@@ -246,6 +246,7 @@ const VALID: [(&str, u32); 11] = [
     ("QUASI_PERIODIC", valid::QUASI_PERIODIC),
     ("OPEN", valid::OPEN),
     ("NEAR_STROBE", valid::NEAR_STROBE),
+    ("TIED", valid::TIED),
 ];
 
 /// Returns the declarations of a precision.

@@ -39,6 +39,16 @@ pub fn status(record: &Record) -> Status {
     Status::from_code(record.status).unwrap_or(Status::NonFinite)
 }
 
+/// Gives the status `simultaneous` to a record of a motion in which two gaps reached their walls at the same time, unless a status of higher
+/// rank says why the motion is undecided.
+pub(crate) fn mark_tied(record: &mut Record) {
+    let is_decided = record.period > 0 || record.valid & valid::QUASI_PERIODIC != 0;
+    let status = status(record);
+    if !status.is_failure() && (is_decided || matches!(status, Status::Ok | Status::StrobeOnEvent)) {
+        record.status = Status::Simultaneous.code();
+    }
+}
+
 fn grows(record: &Record) -> bool {
     record.valid & valid::LYAPUNOV != 0 && record.lyapunov > CHAOS_ERRORS * record.lyapunov_error
 }
@@ -77,6 +87,22 @@ mod tests {
         }
         let unmeasured = Record { valid: valid::PERIOD, ..record(Status::Ok, 0, 0.2, 0.01) };
         assert_eq!(classify(&unmeasured), Class::Undecided);
+    }
+
+    #[test]
+    fn a_tie_is_reported_unless_a_motion_is_undecided_for_another_reason() {
+        let marked = |status, period| {
+            let mut record = record(status, period, 0.2, 0.01);
+            mark_tied(&mut record);
+            Status::from_code(record.status).unwrap()
+        };
+        for status in [Status::Ok, Status::StrobeOnEvent] {
+            assert_eq!([0, 2].map(|period| marked(status, period)), [Status::Simultaneous; 2]);
+        }
+        for status in [Status::Slow, Status::Neutral] {
+            assert_eq!([0, 2].map(|period| marked(status, period)), [status, Status::Simultaneous]);
+        }
+        assert_eq!(marked(Status::Escape, 0), Status::Escape);
     }
 
     #[test]

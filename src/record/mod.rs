@@ -47,6 +47,8 @@ pub mod valid {
     // The bits from 9 on belong to the groups of [`measures`](super::measures::GROUPS).
     /// The numbers of each of several gaps.
     pub const GAPS: u32 = 1 << 21;
+    /// Set by lanes, cleared by engines: two gaps reached their walls at the same time.
+    pub const TIED: u32 = 1 << 27;
     /// A lane began the cell, and the reference finished it.
     pub const BY_REFERENCE: u32 = 1 << 28;
     /// Set by lanes, cleared by engines: the lane has ended before its class is decided, so that the reference continues it.

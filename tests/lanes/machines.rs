@@ -3,18 +3,22 @@
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
 use crate::common::gpu::{all_records, map, open};
+use crate::common::{REST, paper};
 use crate::reference_tests::machines::random::{Shape, case};
 use rattlemap::gpu::{Features, Lane, LaneSettings, MachineShape, Precision};
 use rattlemap::map::engine::{Cpu, Engine};
-use rattlemap::map::plan::Plan;
+use rattlemap::map::plan::{Cell, Plan};
 use rattlemap::map::scene::{FileText, Purpose, Scene};
-use rattlemap::record::classify::classify;
+use rattlemap::record::classify::{classify, status};
 use rattlemap::record::measures::GROUPS;
-use rattlemap::record::valid;
+use rattlemap::record::{Record, Spelling, valid};
 use rattlemap::validate::{Field, differences};
 use rattlemap_dynamics::machine::{MachineMotion, System};
-use rattlemap_dynamics::model::Form;
-use rattlemap_dynamics::model::{GearPair, Law, NonImpacting, Oscillator, State, state};
+use rattlemap_dynamics::model::{
+    Contact, Form, GearPair, Law, NonImpacting, Oscillator, Restitution, State, state,
+};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
 use rayon::prelude::*;
 
 /// Forcing periods that are compared.
@@ -34,9 +38,9 @@ struct End {
     size: f64,
 }
 
-fn run(system: &System, start: &State) -> Option<(State, u64)> {
+fn run(system: &System, start: &State, periods: u32) -> Option<(State, u64)> {
     let mut motion = MachineMotion::new(system, start);
-    for _ in 0..PERIODS {
+    for _ in 0..periods {
         motion.advance_period(&mut ()).ok()?;
     }
     (!motion.near_grazing()).then(|| (motion.state(), motion.work().impacts))
@@ -51,7 +55,7 @@ fn distance(a: &State, b: &State, omega: f64) -> f64 {
 /// Returns the reference's motion, if it does not depend on rounding.
 fn reference(machine: &Oscillator, start: &State) -> Option<End> {
     let system = System::new(machine);
-    let (end, impacts) = run(&system, start)?;
+    let (end, impacts) = run(&system, start, PERIODS)?;
     let size = distance(&end, &state(&[]), machine.omega).max(distance(start, &state(&[]), machine.omega));
     let mut amplification = 1.0f64;
     for i in 0..2 * machine.degrees() {
@@ -59,7 +63,7 @@ fn reference(machine: &Oscillator, start: &State) -> Option<End> {
             let unit = if i % 2 == 0 { size } else { size * machine.omega };
             let mut changed = *start;
             changed[i] += sign * CHANGE * unit;
-            let (other, count) = run(&system, &changed)?;
+            let (other, count) = run(&system, &changed, PERIODS)?;
             if count != impacts {
                 return None;
             }
@@ -238,4 +242,128 @@ fn random_machines_move_as_on_the_reference() {
 fn large_machines_move_as_on_the_reference() {
     compare(Shape { coordinates: 2, gaps: 1, harmonics: 3, stages: 1, friction: 2, walls: 3 }, 64, [12, 30]);
     compare(Shape { coordinates: 8, gaps: 3, harmonics: 8, stages: 1, friction: 0, walls: 1 }, 32, [25, 500]);
+}
+
+/// Lanes replace the rest of a series of impacts by its limit as the reference does: classes, words, impacts and exponents agree.
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn series_of_impacts_of_machines_end_as_on_the_reference() {
+    let by_speed = Restitution::BySpeed { constant: 0.8, factor: -0.1, power: 0.5 };
+    let laws = |e: f64| [(e, 0.0, None), (e, 1e-6, None), (e, 0.0, Some(by_speed))];
+    let plane = [(0.3, 1.3), (0.5, 1.0), (0.56, 1.5), (0.2, 2.0), (0.8, 1.2)];
+    let contacts = [Contact::Impact, Contact::Rigid];
+    let mut cells = Vec::new();
+    for (own, omega) in plane {
+        for ((e, mesh_speed, restitution), contact) in
+            laws(own).into_iter().flat_map(|law| contacts.map(|contact| (law, contact)))
+        {
+            let pair = GearPair { mesh_speed, ..paper(e, omega) };
+            let mut machine = pair.oscillator().unwrap();
+            for wall in machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten()) {
+                wall.contact = contact;
+                wall.restitution = restitution.unwrap_or(wall.restitution);
+            }
+            cells.push((machine, pair.law()));
+        }
+    }
+    let forms: Vec<_> = cells.iter().map(|(machine, _)| Form::Machine(machine.clone())).collect();
+    let lanes: Vec<_> = (0..cells.len() as u32).map(|flow| Lane { flow, law: 0, start: REST }).collect();
+    let orbit = |form: &Form| {
+        let flow = Flow::new(form);
+        analyse_flow(&flow, cells[0].1, REST, &Settings::default(), EVENT_PERIODS)
+    };
+    let expected: Vec<_> = forms.par_iter().map(orbit).collect();
+    let settings = LaneSettings { features: Features::of(&forms[0]), ..LaneSettings::default() };
+    for (precision, bar) in [(Precision::F32, 1e-5), (Precision::F64, 1e-9)] {
+        let records =
+            pollster::block_on(open(precision).run(&forms, &[cells[0].1], &lanes, &settings)).unwrap();
+        for ((record, orbit), (machine, _)) in records.iter().zip(&expected).zip(&cells) {
+            let wall = &machine.gaps[0].walls[0][0];
+            let at = format!("{precision:?}, omega = {}: {wall:?}", machine.omega);
+            assert_eq!(classify(record), orbit.class, "{at}");
+            if orbit.class == Class::Chaotic {
+                continue;
+            }
+            let apart = (record.lyapunov - orbit.lyapunov).abs();
+            assert!(apart < bar, "{at}: {} {}", record.lyapunov, orbit.lyapunov);
+            assert_eq!(record.spelling(), Some(Spelling::new(&orbit.word)), "{at}");
+            assert!((record.impacts_per_period - orbit.impacts_per_period).abs() < 1e-9, "{at}");
+        }
+    }
+}
+
+/// A bar on two shaken supports. With `J = 1`, an impact at one end does not move the other end.
+const BAR: &str = r#"
+name = "bar"
+title = "Bar on two supports"
+summary = "a bar that falls on two supports at its ends"
+[parameters]
+J = { default = 1.0, meaning = "moment of inertia" }
+A = { default = 2.0, meaning = "force" }
+omega = { default = 20.0, meaning = "frequency" }
+[motion]
+coordinates = ["y", "theta"]
+mass = [["1", "0"], ["0", "J"]]
+damping = [["0", "0"], ["0", "0"]]
+stiffness = [["0", "0"], ["0", "0"]]
+force = ["A", "0"]
+load = ["-9.81", "0"]
+frequency = "omega"
+gap = { left = [1, -1], right = [1, 1] }
+[[contact]]
+gap = "left"
+side = "left"
+at = "0"
+law = "impact"
+restitution = "0.7"
+[[contact]]
+gap = "right"
+side = "left"
+at = "0"
+law = "impact"
+restitution = "0.7"
+"#;
+
+const SCENE_OF_BAR: &str = r#"
+model = "bar.toml"
+axis = [
+    { parameter = "J", values = [0.3333333333333333, 1.0] },
+    { start = "theta", min = 0.0, max = 0.01, count = 2 },
+]
+[start]
+policy = "state"
+state = [0.1, 0.0, 0.0, 0.0]
+"#;
+
+/// A bar that falls flat has two impacts at once. The gap that comes first in the model has its impact first.
+#[test]
+#[ignore = "compiles shaders of its own; scripts/test.sh --all"]
+fn lanes_see_impacts_at_the_same_time_as_the_reference_does() {
+    let model = |_, _: &str| Ok(FileText { name: "bar".into(), text: BAR.into() });
+    let scene = Scene::parse_with_files(SCENE_OF_BAR, "s", &[], Purpose::Map, None, &model).unwrap();
+    let plan = Plan::new(&scene);
+    let expected = all_records(&plan, &mut Engine::Cpu(Cpu::new(&plan)));
+    let is_tied = |records: &[Record]| -> Vec<bool> {
+        records.iter().map(|record| status(record) == Status::Simultaneous).collect()
+    };
+    assert_eq!(is_tied(&expected), [true, false, false, false]);
+    let cells = plan.cells(0..plan.cell_count());
+    let forms: Vec<_> = cells.iter().map(|cell| plan.form(cell.flow)).collect();
+    let lane = |(flow, cell): (u32, &Cell)| Lane { flow, law: 0, start: cell.start };
+    let lanes: Vec<_> = (0..).zip(&cells).map(lane).collect();
+    let settings = LaneSettings { features: Features::of(&forms[0]), ..LaneSettings::only(1) };
+    for (precision, rounding) in [(Precision::F32, 1e-7), (Precision::F64, 1e-15)] {
+        let mut gpu = open(precision);
+        assert_eq!(is_tied(&map(&plan, &mut gpu)), is_tied(&expected), "{precision:?}");
+        // The bar falls in the first period.
+        let law = plan.law(cells[0].law);
+        let records = pollster::block_on(gpu.run(&forms, &[law], &lanes, &settings)).unwrap();
+        assert_eq!(is_tied(&records), is_tied(&expected), "{precision:?}");
+        for ((record, form), cell) in records.iter().zip(&forms).zip(&cells) {
+            let Form::Machine(machine) = form else { panic!("a machine has two gaps") };
+            let (end, _) = run(&System::new(machine), &cell.start, 1).unwrap();
+            let error = distance(&record.strobe(), &end, machine.omega);
+            assert!(error < rounding, "{precision:?}, cell {}: error {error:.1e}", cell.id);
+        }
+    }
 }

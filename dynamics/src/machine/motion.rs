@@ -8,6 +8,7 @@ mod settle;
 mod start;
 mod tangents;
 
+pub use act::TIE;
 pub(crate) use start::CarriedModes;
 
 use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};

@@ -13,7 +13,7 @@ use std::thread;
 
 use super::{drop_unrequested, measured_record};
 use crate::map::plan::{Needs, Plan};
-use crate::record::classify::status;
+use crate::record::classify::{mark_tied, status};
 use crate::record::{Record, valid};
 use rattlemap_dynamics::model::{Form, Law};
 use rattlemap_dynamics::motion::Flow;
@@ -73,7 +73,7 @@ impl Completion {
 
     fn finish(&self, record: &mut Record, flow: &Flow, law: Law) {
         let (strobe, bits, periods_run) = (record.strobe(), record.valid, record.periods_run);
-        record.valid &= !(valid::OPEN | valid::NEAR_STROBE);
+        record.valid &= !(valid::OPEN | valid::NEAR_STROBE | valid::TIED);
         let second = if bits & valid::OPEN != 0 {
             let rest = self.budget.after(periods_run);
             let measured = measure_until(flow, law, flow.in_front(strobe), &rest, &self.halt);
@@ -94,6 +94,9 @@ impl Completion {
         };
         if let Some(second) = second {
             *record = Record { valid: second.valid | valid::BY_REFERENCE, ..second };
+            if bits & valid::TIED != 0 {
+                mark_tied(record);
+            }
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::word;
 pub(super) const RELEASE_ORDER: usize = 3;
 
 /// Time between two impacts, in forcing periods, within which their order is not known.
-const TIE: f64 = 1e-12;
+pub const TIE: f64 = 1e-12;
 
 impl MachineMotion<'_> {
     /// Processes the root of a watch.
