@@ -4,7 +4,8 @@
 //!
 //! Each wall and each element with dry friction has a few modes. A combination of all modes and a stage is a *domain*, in which the
 //! equations of motion are linear. Domains are built on first use. The gaps are coordinates, completed by displacements, so that a contact
-//! puts its gap exactly on the wall.
+//! puts its gap exactly on the wall. A gap whose row depends on those of earlier gaps is one coordinate more. The mobility matrix is then
+//! singular, and accelerations keep the relation of the gaps. Rounding breaks it slowly, so each event and each phase 0 restore it.
 //!
 //! ```text
 //! a = (d, w, cos and sin of each harmonic, 1),   d' = w,   w' = row of accelerations . a

@@ -21,12 +21,12 @@ pub use error::OscillatorError;
 pub use gear_pair::GearPair;
 pub use law::{Contact, Law};
 pub use non_impacting::NonImpacting;
-pub(crate) use oscillator::LEAST_LENGTH;
 pub use oscillator::{
     Curve, Drive, DryFriction, Forces, GapRow, HIGHEST_ORDER, MOST_COORDINATES,
     MOST_COORDINATES_AND_HARMONICS, MOST_FRICTION, MOST_GAPS, MOST_HARMONICS, MOST_PIECES, MOST_SIGNALS,
     MOST_SPRINGS, MOST_WALLS, NonlinearSpring, Oscillator, Restitution, Signal, Spring, Timing, Wall,
 };
+pub(crate) use oscillator::{LEAST_LENGTH, ON_WALL};
 pub(crate) use pair::is_semidefinite;
 pub use pair::{Domain, Form, Harmonic, OuterWall, Pair, Stage};
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};

@@ -1,6 +1,6 @@
 //! Features of oscillators whose shader code is compiled only if it is needed.
 
-use super::machine::{MODES, MOST_DOMAINS, MachineShape, domain_count};
+use super::machine::{MODES, MOST_DOMAINS, MOST_GAPS, MachineShape, domain_count};
 use super::pair::has_negative_preload;
 use rattlemap_dynamics::model::{Contact, DryFriction, Form, Pair, Side, Timing};
 
@@ -25,6 +25,8 @@ pub struct Features {
     pub machine: Option<MachineShape>,
     /// Machines with more domains than a table can hold.
     pub too_many_domains: bool,
+    /// Machines with more gaps than a lane's start has room for, or with gaps whose rows depend on those of others.
+    pub dependent_gaps: bool,
     /// Machines without force, whose cycles have periods of their own.
     pub unforced: bool,
     /// Nonlinear springs, and friction that depends on the sliding rate or is larger at rest. No shader supports them.
@@ -39,6 +41,8 @@ impl Features {
             Form::Machine(machine) => Features {
                 machine: Some(MachineShape::of(&machine)),
                 too_many_domains: domain_count(&machine) > MOST_DOMAINS,
+                dependent_gaps: machine.gaps.len() > MOST_GAPS
+                    || machine.leading_gaps().len() < machine.gaps.len(),
                 unforced: machine.timing != Timing::Forced,
                 curves: !machine.springs.is_empty() || !machine.friction.iter().all(DryFriction::is_constant),
                 ..Features::default()
@@ -59,6 +63,7 @@ impl Features {
             negative_preload: has_negative_preload(pair),
             machine: None,
             too_many_domains: false,
+            dependent_gaps: false,
             unforced: false,
             curves: false,
         }
@@ -79,6 +84,7 @@ impl Features {
                 (own, others) => own.or(others),
             },
             too_many_domains: self.too_many_domains || other.too_many_domains,
+            dependent_gaps: self.dependent_gaps || other.dependent_gaps,
             unforced: self.unforced || other.unforced,
             curves: self.curves || other.curves,
         }
@@ -102,6 +108,11 @@ impl Features {
     fn without_code(self) -> [(bool, &'static str, &'static str); 4] {
         let preload = "a wall that only pushes and has a negative preload";
         [
+            (
+                self.dependent_gaps,
+                "more than three gaps, or gap rows that depend on each other",
+                "dependent_gaps",
+            ),
             (self.too_many_domains, "more than 4096 combinations of modes", "too_many_domains"),
             (self.negative_preload, preload, "negative_preload"),
             (self.unforced, "motion without force", "unforced"),
@@ -144,5 +155,16 @@ mod tests {
         let without_force = model.oscillator().unwrap();
         assert_eq!(Features::of(&without_force), features);
         assert!(Flow::new(&without_force).pair().is_none());
+    }
+
+    #[test]
+    fn lanes_refuse_dependent_gaps() {
+        let mut oscillator = FileModel::built_in("two-loose-gears").unwrap().oscillator().unwrap();
+        let reason = |oscillator| Features::of(oscillator).needing_reference();
+        assert_eq!(reason(&oscillator), None);
+        let mut third = oscillator.gaps[1].clone();
+        third.row += &oscillator.gaps[0].row;
+        oscillator.gaps.push(third);
+        assert!(reason(&oscillator).is_some_and(|reason| reason.contains("depend on each other")));
     }
 }

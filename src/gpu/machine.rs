@@ -11,6 +11,9 @@ use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::machine::{StartModes, System};
 use rattlemap_dynamics::model::{Contact, NonImpacting, Oscillator, STATE, Side, State, Wall};
 
+/// Largest number of gaps for which a lane's start has room.
+pub(super) const MOST_GAPS: usize = 3;
+
 /// Largest number of domains in a table.
 pub(super) const MOST_DOMAINS: usize = 4096;
 
@@ -417,14 +420,13 @@ impl MachineConstants {
         let packed = |bits: u32, numbers: &[u32]| {
             numbers.iter().zip(0..).map(|(number, i)| number << (bits * i)).fold(0, |all, one| all | one)
         };
-        let orders = modes.walls.map(|(_, order)| order);
+        let of_gaps = |bits: u32, numbers: &[u32]| packed(bits, &numbers[..MOST_GAPS]);
+        let [sides, orders] = [modes.walls.map(|(side, _)| side), modes.walls.map(|(_, order)| order)];
         let packs = [
-            packed(5, &modes.gaps) | packed(2, &modes.slips) << 15,
+            of_gaps(5, &modes.gaps) | packed(2, &modes.slips) << 15,
             // The stage is here so that f32 holds each number exactly.
-            packed(2, &modes.origins)
-                | packed(2, &modes.walls.map(|(side, _)| side)) << 6
-                | modes.stage << 12,
-            packed(3, &orders) | packed(3, &modes.from_force) << 9 | packed(3, &modes.from_rate) << 18,
+            of_gaps(2, &modes.origins) | of_gaps(2, &sides) << 6 | modes.stage << 12,
+            of_gaps(3, &orders) | of_gaps(3, &modes.from_force) << 9 | packed(3, &modes.from_rate) << 18,
         ];
         start.extend(packs.map(f64::from));
         let begins_now = self.system.machine().schedule.first().is_some_and(|change| change.0 == 0.0);

@@ -265,8 +265,8 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
     let of_gap = quantity.rsplit_once(" gap ").and_then(|(_, nth)| nth.parse().ok());
     let gap = of_gap.map_or(0, |nth: usize| nth - 1);
     match quantity.split(' ').next().unwrap_or_default() {
-        "entry" | "the" => (Table::Motion, "gap"),
-        "row" => (Table::Gap(gap), "gap"),
+        "entry" => (Table::Motion, "gap"),
+        "row" | "the" => (Table::Gap(gap), "gap"),
         "independence" => (Table::Motion, "gap"),
         "lowest" => (Table::Motion, "mass"),
         "difference" => (Table::Motion, if quantity.contains("mass") { "mass" } else { "stiffness" }),

@@ -1,7 +1,7 @@
 //! Model files: names, parameters and matrices in TOML, read into a [`Model`]. Pure.
 //!
 //! A file defines `M x'' + C x' + K x = force cos(frequency t) + force_sin sin(frequency t) + load` in one to eight
-//! coordinates, up to three gaps `z = g . x`, and up to four walls on each side of a gap. The force may have further harmonics. `C`, `K`
+//! coordinates, up to six gaps `z = g . x`, and up to four walls on each side of a gap. The force may have further harmonics. `C`, `K`
 //! and `load` may change at given phases of the period, and dry friction may act. Entries are numbers or [expressions](crate::text::expression) in the parameters, computed in
 //! f64. `docs/models.md` describes each key.
 

@@ -17,7 +17,7 @@ const MOTION_KEYS: [&str; 19] = [
 ];
 
 /// Limits of all models, for messages.
-const LIMITS: &str = "a model has one to eight coordinates and up to three gap rows; further harmonics of the force are tables, [[harmonic]]";
+const LIMITS: &str = "a model has one to eight coordinates and up to six gap rows; further harmonics of the force are tables, [[harmonic]]";
 
 /// Names of several rows, for messages.
 const NAMED_ROWS: &str = "gap = { a = [1, -1, 0], b = [0, 1, -1] }";
@@ -208,11 +208,8 @@ fn read_gaps(section: &Section<'_>, names: Names<'_>, count: usize) -> Result<Ve
         return Ok(vec![Gap { name: None, row: names.vector(&field, count, what)? }]);
     };
     let rows = table.fields_as_written();
-    let most = MOST_GAPS.min(count);
-    if !(1..=most).contains(&rows.len()) {
-        let remedy = format!(
-            "1 to {most} rows with names, such as {NAMED_ROWS}: a model has at most {MOST_GAPS}, and not more than coordinates"
-        );
+    if !(1..=MOST_GAPS).contains(&rows.len()) {
+        let remedy = format!("1 to {MOST_GAPS} rows with names, such as {NAMED_ROWS}");
         return Err(field.wrong_count(rows.len(), "rows", &remedy));
     }
     let read_one = |(name, field): (&str, Field<'_>)| {

@@ -159,7 +159,7 @@ fn errors_name_the_field_and_the_limit() {
 ["x"] | ["a", "b", "c", "d", "f", "g", "h", "q", "l"] | is out of range: it must be 1 to 8 names: a model has at most 8 degrees of freedom
 ["x"] | [] | m.toml:14:15: `motion.coordinates = []` is out of range: it must be 1 to 8 names: a model has at most 8 degrees of freedom
 gap = [1] | gap = [1]\nforce2 = ["F"] | m.toml:22:1: unknown field `motion.force2 = ["F"]`; did you mean `force`?
-gap = [1] | gap = [1]\nharmonics = 2 | a model has one to eight coordinates and up to three gap rows; further harmonics of the force are tables, [[harmonic]]
+gap = [1] | gap = [1]\nharmonics = 2 | a model has one to eight coordinates and up to six gap rows; further harmonics of the force are tables, [[harmonic]]
 "omega"\ngap | ["omega", "2*omega"]\ngap | m.toml:20:13: `motion.frequency = ["omega", "2*omega"]` has the wrong type: it must be one entry, the frequency of the first harmonic, force cos(frequency t) + force_sin sin(frequency t); write multiples of it as [[harmonic]]
 gap = [1] | gap = [[1], [2]] | m.toml:21:7: `motion.gap = [[1], [2]]` is out of range: it must be one gap row: a list of one entry; several rows have names, such as gap = { a = [1, -1, 0], b = [0, 1, -1] }
 [[contact]] | [[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]]\nside = "left"\nat = -1\nlaw = "impact"\nrestitution = 1\n[[contact]] | `contact.1.side = "left"` does not fit: the wall before it on this side has impacts
@@ -1183,21 +1183,53 @@ at = "s" | at = "speed" | `contact.0.at = "speed"` has an unknown name, `speed`
 }
 
 #[test]
+fn gap_rows_may_depend_on_each_other() {
+    let text = r#"
+name = "two-masses"
+[motion]
+coordinates = ["x1", "x2"]
+mass = [[1, 0], [0, 2]]
+frequency = 1
+gap = { left = [1, 0], middle = [-1, 1], right = [0, 1] }
+[[contact]]
+gap = "left"
+side = "left"
+at = 0
+law = "impact"
+restitution = 0.5
+[[contact]]
+gap = "middle"
+side = "left"
+at = 0
+law = "impact"
+restitution = 0.5
+[[contact]]
+gap = "right"
+side = "right"
+at = 10
+law = "impact"
+restitution = 0.5
+"#;
+    let oscillator = read(text).oscillator().unwrap();
+    assert_eq!((oscillator.gaps.len(), oscillator.leading_gaps()), (3, vec![0, 1]));
+}
+
+#[test]
 fn errors_in_gaps_name_the_field() {
     check_refusals(
         THREE,
         r#"
 gap = { left = [1, -1, 0], right = [0, 1, "-c"] } | gap = [1, -1, 0] | m.toml:28:7: `contact.0.gap = "right"` does not fit: the gap row in [motion] has no name; remove it, or name the rows, such as gap = { a = [1, -1] }
-gap = { left = [1, -1, 0], right = [0, 1, "-c"] } | gap = {} | `motion.gap = 0 rows` is out of range: it must be 1 to 3 rows with names, such as gap = { a = [1, -1, 0], b = [0, 1, -1] }: a model has at most 3, and not more than coordinates
-left = [1, -1, 0], | left = [1, -1, 0], c1 = [1, 0, 0], c2 = [0, 0, 1], | `motion.gap = 4 rows` is out of range: it must be 1 to 3 rows
+gap = { left = [1, -1, 0], right = [0, 1, "-c"] } | gap = {} | `motion.gap = 0 rows` is out of range: it must be 1 to 6 rows with names, such as gap = { a = [1, -1, 0], b = [0, 1, -1] }
+left = [1, -1, 0], | left = [1, -1, 0], c1 = [1, 0, 0], c2 = [0, 0, 1], c3 = [1, 0, 0], c4 = [1, 0, 1], c5 = [1, 1, 1], | `motion.gap = 7 rows` is out of range: it must be 1 to 6 rows
 left = [1, -1, 0], | left = [1, -1, 0], low = [1, 0, 0], | m.toml:20:34: `motion.gap.low = [1, 0, 0]` does not fit: no wall limits this gap; write a [[contact]] with gap = "low", or remove the row
 left = [1, -1, 0], | left = [1, -1], | m.toml:20:16: `motion.gap.left = [1, -1]` is out of range: it must be one gap row: a list of three entries, one for each coordinate
 left = [1, -1, 0], | k = [1, -1, 0], | m.toml:20:13: `motion.gap.k = [1, -1, 0]` does not fit: `k` is already the name of a parameter, a coordinate or a velocity; rename the gap or the other
 left = [1, -1, 0], | v2 = [1, -1, 0], | `v2` is already the name of a parameter
 left = [1, -1, 0], | side = [1, -1, 0], | `side` is a column of tables
 left = [1, -1, 0], | left = ["1/0", -1, 0], | m.toml:20:16: `motion.gap.left = ["1/0", -1, 0]` does not fit: at the defaults of three, row of gap 1 = inf: it must be a finite number
-left = [1, -1, 0], | left = [0, -2, 1], | m.toml:20:7: `motion.gap = { ... }` does not fit: at the defaults of three, independence of the rows of the gaps 1 to 2 = 0: it must be above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap
-left = [1, -1, 0], | left = [0, 0, 0], | independence of the rows of the gaps 1 to 1 = 0: it must be above 1e-12
+left = [1, -1, 0], | left = [0, -2, 2.0000001], | m.toml:20:7: `motion.gap = { ... }` does not fit: at the defaults of three, independence of the rows of the gaps 1 to 2 = 0.5: it must be above 1e-12
+left = [1, -1, 0], | left = [0, 0, 0], | m.toml:20:16: `motion.gap.left = [0, 0, 0]` does not fit: at the defaults of three, the largest entry of the gap row of gap 1 = 0: it must be different from 0
 gap = "right"\n | gap = "middle"\n | m.toml:28:7: `contact.0.gap = "middle"` is not known; valid names: left, right
 gap = "right"\n | | m.toml:27:1: `contact.0.gap` is missing; the gaps in [motion] have names: write gap = "left" or gap = "right"
 gap = "right"\n | gap = 1\n | `contact.0.gap = 1` has the wrong type: it must be one of left, right

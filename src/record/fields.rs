@@ -111,7 +111,8 @@ const CYCLE_TIME: usize = 1 + OF_DRIFTS + (MEASURES - OF_DRIFTS) / 2 - OF_SIGNAL
 /// two coordinates with one gap do not have, the next one those of each of several gaps. The last one has the only number of the last
 /// group but one, those of signals, drifts, the time of a cycle, and the errors of drifts.
 pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
-    let further = field!("further_displacements", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
+    let further =
+        field!("further_displacements_and_gaps", OF_GAPS - FURTHER, 8, |record, nth| record.measures[nth]);
     let mut fields = [Field { first: FURTHER, ..further }; BEFORE.len() + GROUP_FIELDS + 3];
     let mut i = fields.len() - 1;
     // Not a block, which would be a copy of the number.
@@ -126,7 +127,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
         }]
     );
     i -= 1;
-    fields[i] = Field { name: "gaps", first: OF_GAPS, count: OF_SIGNALS - OF_GAPS, ..further };
+    fields[i] = Field { name: "each_of_six_gaps", first: OF_GAPS, count: OF_SIGNALS - OF_GAPS, ..further };
     i = 0;
     while i < fields.len() - 3 {
         fields[i] = match i.checked_sub(BEFORE.len()) {
@@ -143,7 +144,7 @@ pub const FIELDS: [Field; BEFORE.len() + GROUP_FIELDS + 3] = {
 
 impl Record {
     /// Number of bytes in messages to and from pages.
-    pub const BYTES: usize = 1280;
+    pub const BYTES: usize = 1520;
 
     /// Returns the bytes of all fields, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {

@@ -1,4 +1,4 @@
-//! Words and patterns in records: up to 64 symbols, or 42 symbols with letters of gaps, or else hash and length.
+//! Words and patterns in records: up to 64 symbols, or 42 with letters of gaps, or 40 with letters after `c`, or else hash and length.
 
 use super::{Record, WORD_SYMBOLS, valid};
 use rattlemap_dynamics::word::Word;
@@ -16,18 +16,24 @@ pub(crate) struct SymbolCode {
 /// Symbols of a model with one gap.
 const PLAIN: SymbolCode = SymbolCode { bits: 3, most: WORD_SYMBOLS, window: 8 };
 
-/// Symbols with the letters of gaps.
+/// Symbols with the letters of the first three gaps, and of all gaps.
 const LETTERED: SymbolCode = SymbolCode { bits: 5, most: 42, window: 6 };
+const WIDE: SymbolCode = SymbolCode { bits: 6, most: 40, window: 5 };
 
-/// Bit of the first number that tells [`LETTERED`] symbols. Symbols take no more than 63 bits.
+/// Bit of the first number that tells [`LETTERED`] and [`WIDE`] symbols, which take no more than 60 bits, and bit of the latter.
 const HAS_LETTERS: u64 = 1 << 63;
+const IS_WIDE: u64 = 1 << 62;
 
 impl SymbolCode {
     fn of(symbols: &[u8]) -> &'static SymbolCode {
-        if symbols.iter().any(|&symbol| symbol > b'7') { &LETTERED } else { &PLAIN }
+        match symbols.iter().max() {
+            Some(80..) => &WIDE,
+            Some(56..) => &LETTERED,
+            _ => &PLAIN,
+        }
     }
 
-    /// Returns the code of a model with a number of gaps.
+    /// Returns the code of a model with a number of gaps, at most three.
     pub(crate) fn of_gaps(gaps: usize) -> &'static SymbolCode {
         if gaps > 1 { &LETTERED } else { &PLAIN }
     }
@@ -77,9 +83,11 @@ impl Spelling {
         let symbols = word.symbols();
         let code = SymbolCode::of(symbols);
         let mut packed = Packed { symbols: [0; 4], hash: word_hash(symbols), length: symbols.len() as u32 };
-        if code.bits == LETTERED.bits {
-            packed.symbols[0] = HAS_LETTERS;
-        }
+        packed.symbols[0] = match code.bits {
+            5 => HAS_LETTERS,
+            6 => HAS_LETTERS | IS_WIDE,
+            _ => 0,
+        };
         if symbols.len() <= code.most {
             for (i, symbol) in symbols.iter().enumerate() {
                 let (number, bit) = code.place(i);
@@ -90,7 +98,11 @@ impl Spelling {
     }
 
     fn unpacked(Packed { symbols, hash, length }: Packed) -> Spelling {
-        let code = if symbols[0] & HAS_LETTERS == 0 { PLAIN } else { LETTERED };
+        let code = match symbols[0] >> 62 {
+            0 | 1 => PLAIN,
+            2 => LETTERED,
+            _ => WIDE,
+        };
         if length as usize > code.most {
             return Spelling::Hashed { hash, length };
         }
@@ -112,8 +124,8 @@ struct Packed {
 
 /// Returns a hash of a cyclic word that does not depend on where the word starts.
 ///
-/// It is the sum over all places of a mix of the eight symbols that begin there (six if they have letters of gaps), in two halves of 32
-/// bits. An engine without 64-bit integers can compute it symbol by symbol, and closes the circle with the first symbols.
+/// It is the sum over all places of a mix of the eight symbols that begin there (six or five if they have letters of gaps), in two halves
+/// of 32 bits. An engine without 64-bit integers can compute it symbol by symbol, and closes the circle with the first symbols.
 pub fn word_hash(symbols: &[u8]) -> u64 {
     let (n, code) = (symbols.len(), SymbolCode::of(symbols));
     let mut halves = [0u32; 2];
@@ -202,6 +214,8 @@ mod tests {
             b"8",
             b"9AI:A",
             &[b'H'; 42],
+            b"9P^g",
+            &[b'g'; 40],
         ] {
             let word = Word::cyclic(symbols);
             let mut record = Record::default();
@@ -241,6 +255,8 @@ mod tests {
         assert!(text.starts_with('#') && text.ends_with("/100"), "{text}");
         record.set_word(&Word::cyclic(&[b'9'; 43]));
         assert!(record.spelling().unwrap().text().ends_with("/43"));
+        record.set_word(&Word::cyclic(&[b'P'; 41]));
+        assert!(record.spelling().unwrap().text().ends_with("/41"));
         let mut lettered: Vec<u8> = (0..60u32).map(|i| b'8' + (i * i % 24) as u8).collect();
         let hash = word_hash(&lettered);
         lettered.rotate_left(11);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::reference_tests::independent::random::{self as one_gap, PLAIN, Shape};
 use crate::reference_tests::machines::motion::{Motion, What};
-use crate::reference_tests::machines::random::{Case, any_case, apart};
+use crate::reference_tests::machines::random::{Case, any_case, apart, dependent_case};
 use crate::reference_tests::machines::system::{ANGLE, System};
 
 /// Largest difference of states, relative to the size of the motion.
@@ -150,6 +150,7 @@ fn the_judge_agrees_with_matrix_exponentials_on_1200_models() {
 #[test]
 fn the_judge_agrees_with_matrix_exponentials_on_machines() {
     check((0..30).map(any_case).collect(), MACHINES);
+    check((0..30).map(dependent_case).collect(), MACHINES);
 }
 
 #[test]

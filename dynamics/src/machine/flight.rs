@@ -153,7 +153,7 @@ impl Frame {
     /// Returns the row of a displacement; 0 if the machine has no such displacement.
     fn displacement_row(&self, i: usize) -> Functional {
         let mut row = [0.0; super::WIDTH];
-        if i < self.n {
+        if i < self.degrees() {
             (0..self.n).for_each(|j| row[j] = self.from_flow[(i, j)]);
         }
         Functional(row)

@@ -55,8 +55,10 @@ pub(super) struct Shift {
 #[derive(Clone, Debug)]
 pub struct Frame {
     pub(super) machine: Oscillator,
-    /// Number of coordinates.
+    /// Number of coordinates of the flow: of the model, and one more for each gap whose row depends on those of earlier gaps.
     pub(super) n: usize,
+    /// For each such gap, a row of `d` that is 0, so that the gap is the sum of multiples of others. Rows of `w` are the same.
+    pub(super) ties: Vec<Numbers>,
     /// Forcing period.
     pub(super) period: f64,
     /// Scales of length and speed.
@@ -66,11 +68,11 @@ pub struct Frame {
     pub(super) escape: f64,
     /// Longest step in any stage and domain.
     pub(crate) longest_step: f64,
-    /// `d = to_flow x`, and its inverse.
+    /// `d = to_flow x`, and `x = from_flow d`, which does not read dependent gaps. Nor do mass, stiffness and damping of free motion.
     to_flow: DMatrix<f64>,
     pub(super) from_flow: DMatrix<f64>,
     pub(super) mass: DMatrix<f64>,
-    /// Inverse of the mass matrix, and the inverse of its Cholesky factor.
+    /// Changes of `w` by unit impulses, and the factor that scales the forces on independent coordinates to mass 1.
     pub(super) mobility: DMatrix<f64>,
     mass_scale: DMatrix<f64>,
     /// For each gap, the changes of all rates by an impulse that changes the gap's rate by 1.
@@ -91,16 +93,34 @@ pub struct Frame {
 impl Frame {
     /// Prepares a machine that [`Oscillator::validate`] accepts.
     pub(super) fn new(machine: &Oscillator) -> Frame {
-        let (machine, n) = (machine.clone(), machine.degrees());
-        let to_flow = coordinates(&machine);
-        let from_flow = to_flow.clone().try_inverse().expect("the rows are independent");
+        let (machine, degrees) = (machine.clone(), machine.degrees());
+        let (to_flow, leading) = coordinates(&machine);
+        let n = to_flow.nrows();
+        let inverted = to_flow.select_rows(&leading).try_inverse().expect("the rows are independent");
+        let mut from_flow = DMatrix::zeros(degrees, n);
+        leading.iter().zip(inverted.column_iter()).for_each(|(&i, column)| from_flow.set_column(i, &column));
+        // The coordinates as sums of multiples of the leading ones.
+        let mut spread = &to_flow * &inverted;
+        for (j, &i) in leading.iter().enumerate() {
+            spread.set_row(i, &DMatrix::identity(degrees, degrees).row(j));
+        }
+        let tie = |gap: usize| {
+            let mut row = [0.0; SIZE];
+            row[gap] = 1.0;
+            // Entries that are zero without rounding are set to zero.
+            let entry = |x: f64| if x.abs() > ROUNDING * spread.row(gap).amax() { x } else { 0.0 };
+            leading.iter().zip(&spread.row(gap)).for_each(|(&i, x)| row[i] = -entry(*x));
+            row
+        };
+        let ties = (0..n).filter(|i| !leading.contains(i)).map(tie).collect();
         let back = from_flow.transpose();
         let mobility = &to_flow * inverse(&machine.mass) * to_flow.transpose();
         let mobility = 0.5 * (&mobility + mobility.transpose());
         let mass = &back * &machine.mass * &from_flow;
         let mass = 0.5 * (&mass + mass.transpose());
-        let factor = mass.clone().cholesky().expect("the mass matrix is positive definite").l();
-        let mass_scale = factor.try_inverse().expect("the factor is regular");
+        let factor = mass.select_rows(&leading).select_columns(&leading).cholesky();
+        let factor = factor.expect("the mass matrix is positive definite").l();
+        let mass_scale = factor.try_inverse().expect("the factor is regular") * spread.transpose();
         let stages: Vec<StageForces> = machine
             .stages
             .iter()
@@ -154,6 +174,7 @@ impl Frame {
         let shifts = rigid_modes.modes.iter().map(shift).collect();
         let mut frame = Frame {
             n,
+            ties,
             rigid_modes,
             shifts,
             period,
@@ -231,6 +252,11 @@ impl Frame {
         (self.length, self.speed, self.escape)
     }
 
+    /// Returns the number of coordinates of the model.
+    pub(super) fn degrees(&self) -> usize {
+        self.from_flow.nrows()
+    }
+
     pub(crate) fn gaps(&self) -> usize {
         self.machine.gaps.len()
     }
@@ -262,7 +288,7 @@ impl Frame {
         let n = self.n;
         let mut y = [0.0; SIZE];
         for i in 0..n {
-            for j in 0..n {
+            for j in 0..self.degrees() {
                 y[i] += self.to_flow[(i, j)] * state[2 * j];
                 y[n + i] += self.to_flow[(i, j)] * state[2 * j + 1];
             }
@@ -274,7 +300,7 @@ impl Frame {
     pub(super) fn to_state(&self, y: &[f64]) -> Numbers {
         let n = self.n;
         let mut state = [0.0; SIZE];
-        for i in 0..n {
+        for i in 0..self.degrees() {
             for j in 0..n {
                 state[2 * i] += self.from_flow[(i, j)] * y[j];
                 state[2 * i + 1] += self.from_flow[(i, j)] * y[n + j];
@@ -283,9 +309,11 @@ impl Frame {
         state
     }
 
-    /// Returns all displacements, given the gaps and the displacements that complete them to coordinates.
+    /// Returns all displacements, given the [leading gaps](Oscillator::leading_gaps) and the displacements that complete them to coordinates.
     pub fn displacements(&self, gaps_and_others: &[f64]) -> Vec<f64> {
-        let d = DVector::from_fn(self.n, |i, _| gaps_and_others[i]);
+        let leading = (0..self.n).filter(|&i| self.ties.iter().all(|tie| tie[i] != 1.0));
+        let mut d = DVector::zeros(self.n);
+        leading.zip(gaps_and_others).for_each(|(i, value)| d[i] = *value);
         (&self.from_flow * d).iter().copied().collect()
     }
 
@@ -322,18 +350,20 @@ fn inverse(mass: &DMatrix<f64>) -> DMatrix<f64> {
     mass.clone().cholesky().expect("the mass matrix is positive definite").inverse()
 }
 
-/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Among displacements with equal factors in a
-/// gap, the lightest body's is left out. If a heavy body's were left out, the force on this body would be a small difference of large
-/// numbers.
-fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
-    let n = machine.degrees();
+/// Returns the rows of the flow's coordinates: the gaps, and displacements that complete them. Also returns the places of independent ones:
+/// all but the gaps that depend on earlier gaps. Among displacements with equal factors in a gap, the lightest body's is left out. If a
+/// heavy body's were left out, the force on this body would be a small difference of large numbers.
+fn coordinates(machine: &Oscillator) -> (DMatrix<f64>, Vec<usize>) {
+    let (n, gaps) = (machine.degrees(), machine.gaps.len());
     let mass = |i: usize| machine.mass[(i, i)];
-    let left_out = machine.displacements_of_gaps(|a, b| mass(a).total_cmp(&mass(b)).then(a.cmp(&b)));
+    let all: Vec<usize> = (0..gaps).collect();
+    let left_out = machine.displacements_of_gaps(&all, |a, b| mass(a).total_cmp(&mass(b)).then(a.cmp(&b)));
     let mut rows: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
     rows.extend(
         (0..n)
-            .filter(|j| !left_out.contains(j))
+            .filter(|j| left_out.iter().all(|(_, pivot)| pivot != j))
             .map(|j| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)))),
     );
-    DMatrix::from_fn(n, n, |i, j| rows[i][j])
+    let leading = left_out.iter().map(|&(gap, _)| gap).chain(gaps..rows.len()).collect();
+    (DMatrix::from_fn(rows.len(), n, |i, j| rows[i][j]), leading)
 }

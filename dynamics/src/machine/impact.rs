@@ -1,5 +1,6 @@
 //! The result of an impact: the jump of all rates, and the modes after the impact.
 
+use super::constraints::NO_MOBILITY;
 use super::domain::LinearDomain;
 use super::domains::System;
 use super::modes::{AtRest, GapMode, Modes};
@@ -135,7 +136,8 @@ impl Impact<'_> {
             resting.iter().zip(let_go).all(|(side, &let_go)| side.is_some() || !let_go)
         };
         for let_go in choices.filter(is_possible) {
-            let (kick, pushes) = self.kick(|other| resting[other].is_some() && !let_go[other]);
+            let held = |other: usize| resting[other].is_some() && !let_go[other];
+            let Some((kick, pushes)) = self.kick(held) else { continue };
             let fits = |other: usize| {
                 let Some(at) = resting[other] else { return true };
                 let sign = -self.side.sign() * at.sign();
@@ -149,30 +151,43 @@ impl Impact<'_> {
                 return (kick, let_go);
             }
         }
-        (self.kick(|other| resting[other].is_some()).0, none)
+        (
+            self.kick(|other| resting[other].is_some()).map_or(self.system.kicks[self.gap], |(kick, _)| kick),
+            none,
+        )
     }
 
-    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1 while walls hold other gaps, at most two. Also
-    /// returns the impulses of these walls, divided by the impulse on the gap.
-    fn kick(&self, is_held: impl Fn(usize) -> bool) -> (Numbers, [f64; MOST_GAPS]) {
-        let (gap, m) = (self.gap, |i, j| self.system.mobility[(i, j)]);
-        let mut pushes = [0.0; MOST_GAPS];
-        let mut held = (0..MOST_GAPS).filter(|&other| is_held(other));
-        match [held.next(), held.next()] {
-            [Some(a), Some(b)] => {
-                let (share, next) = (m(a, b) / m(a, a), m(b, gap) - m(a, b) * (m(a, gap) / m(a, a)));
-                pushes[b] = next / (m(b, b) - m(a, b) * share);
-                pushes[a] = m(a, gap) / m(a, a) - share * pushes[b];
+    /// Returns the changes of all rates by an impulse that changes the gap's rate by 1 while walls hold other gaps. Also returns the impulses
+    /// of these walls, divided by the impulse on the gap. The impulse of a wall is 0 if earlier ones hold its gap. None if the walls hold the
+    /// gap itself.
+    fn kick(&self, is_held: impl Fn(usize) -> bool) -> Option<(Numbers, [f64; MOST_GAPS])> {
+        let (gap, gaps, m) = (self.gap, self.system.gaps(), |i, j| self.system.mobility[(i, j)]);
+        // Gaussian elimination. The last entry of a row is the right-hand side.
+        let mut rows: Vec<(usize, [f64; MOST_GAPS + 1])> = Vec::new();
+        for held in (0..gaps).filter(|&other| is_held(other)) {
+            let mut row = [0.0; MOST_GAPS + 1];
+            (0..gaps).for_each(|other| row[other] = m(held, other));
+            row[MOST_GAPS] = m(held, gap);
+            for (earlier, of_earlier) in &rows {
+                let factor = row[*earlier];
+                row.iter_mut().zip(of_earlier).for_each(|(x, earlier)| *x -= factor * earlier);
             }
-            [Some(a), None] => pushes[a] = m(a, gap) / m(a, a),
-            _ => {}
+            let pivot = row[held];
+            if pivot > NO_MOBILITY * m(held, held) {
+                rows.push((held, row.map(|x| x / pivot)));
+            }
+        }
+        let mut pushes = [0.0; MOST_GAPS];
+        for (nth, (held, row)) in rows.iter().enumerate().rev() {
+            let later = rows[nth + 1..].iter().map(|&(other, _)| row[other] * pushes[other]);
+            pushes[*held] = row[MOST_GAPS] - later.sum::<f64>();
         }
         let mut kick = [0.0; SIZE];
         for i in (0..self.system.n).filter(|&i| i >= MOST_GAPS || !is_held(i)) {
-            let held = (0..self.system.gaps()).filter(|&other| is_held(other));
+            let held = (0..gaps).filter(|&other| is_held(other));
             kick[i] = m(i, gap) - held.map(|other| m(i, other) * pushes[other]).sum::<f64>();
         }
-        (kick.map(|change| change / kick[gap]), pushes)
+        (kick[gap] > NO_MOBILITY * m(gap, gap)).then(|| (kick.map(|change| change / kick[gap]), pushes))
     }
 
     /// Chooses the modes of friction and of other gaps at rest after a jump of the rates. `point` has the rates after the jump; `stopped`
@@ -192,7 +207,11 @@ impl Impact<'_> {
             let moves = element.row.iter().zip(kick).map(|(row, kick)| row * kick);
             let (moved, size) = moves.fold((0.0, 0.0), |(sum, size), x: f64| (sum + x, size + x.abs()));
             if jumps && moved.abs() > 1e-12 * size {
-                let [rate, size] = element.rate_and_size(&point[n..]);
+                let [rate, mut size] = element.rate_and_size(&point[n..]);
+                if !system.ties.is_empty() {
+                    // A rate along a dependent gap is a sum of rates that may cancel.
+                    size += element.rate_and_size(&self.point[n..])[1];
+                }
                 at_rest.elements[i] = rate.abs() <= ROUNDING * size;
                 modes.slips[i] = if at_rest.elements[i] { Slip::Stick } else { Slip::of(rate) };
             } else {

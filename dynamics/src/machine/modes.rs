@@ -1,8 +1,9 @@
 //! Modes of walls and friction.
 
-use super::PhasePoint;
+use super::constraints::NO_MOBILITY;
 use super::domain::{DomainKey, Functional};
 use super::frame::Frame;
+use super::{Numbers, PhasePoint, SIZE};
 use crate::model::{Curve, MOST_FRICTION, MOST_GAPS, MOST_SPRINGS, Side};
 use crate::motion::{Slip, Slips};
 
@@ -178,11 +179,29 @@ impl Frame {
         })
     }
 
-    /// Removes rounding errors from the rates of sticking elements and of gaps at rest.
+    /// Removes rounding errors from the rates of sticking elements and of gaps at rest, and from dependent gaps.
     pub(super) fn hold(&self, modes: &Modes, y: &mut [f64], is_tangent: bool) {
         let n = self.n;
         let is_stuck = |j: usize| modes.gaps.get(j).is_some_and(|mode| mode.rest().is_some());
         (0..n).filter(|&j| is_stuck(j)).for_each(|j| y[n + j] = 0.0);
+        if !self.ties.is_empty() {
+            let lies = |j: usize, y: f64| {
+                let mut walls = (j < self.gaps())
+                    .then(|| self.machine.gaps[j].walls.iter().flatten())
+                    .into_iter()
+                    .flatten();
+                is_stuck(j) || !is_tangent && walls.any(|wall| wall.at == y)
+            };
+            let fixed: [bool; SIZE] = std::array::from_fn(|j| j < n && lies(j, y[j]));
+            project(&mut y[..n], self.ties.iter().map(|tie| (*tie, 0.0)), |j, _| fixed[j]);
+            let sticking = self.elements.iter().zip(modes.slips).filter(|(_, slip)| *slip == Slip::Stick);
+            let sticking = sticking.map(|(element, _)| {
+                let row = std::array::from_fn(|j| if j < n { element.row[j] } else { 0.0 });
+                (row, if is_tangent { 0.0 } else { element.speed })
+            });
+            let rows = self.ties.iter().map(|tie| (*tie, 0.0)).chain(sticking);
+            return project(&mut y[n..2 * n], rows, |j, w| is_stuck(j) || fixed[j] && w == 0.0);
+        }
         let mut pivots = [None; MOST_FRICTION];
         // The second pass completes the first where rows share coordinates.
         for pass in 0..2 {
@@ -198,6 +217,28 @@ impl Frame {
                 let speed = if is_tangent { 0.0 } else { element.speed };
                 y[n + j] = (speed - others) / element.row[j];
             }
+        }
+    }
+}
+
+/// Moves entries as little as possible so that the products with rows have given values. Fixed entries stay; a row is left out if earlier
+/// rows and fixed entries determine its product.
+fn project(y: &mut [f64], rows: impl Iterator<Item = (Numbers, f64)>, is_fixed: impl Fn(usize, f64) -> bool) {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut directions: Vec<Numbers> = Vec::new();
+    let fixed: [bool; SIZE] = std::array::from_fn(|j| y.get(j).is_none_or(|&y| is_fixed(j, y)));
+    for (row, value) in rows {
+        let mut direction: Numbers = std::array::from_fn(|j| if fixed[j] { 0.0 } else { row[j] });
+        for earlier in &directions {
+            let along = dot(earlier, &direction);
+            direction.iter_mut().zip(earlier).for_each(|(x, earlier)| *x -= along * earlier);
+        }
+        let size = dot(&direction, &direction).sqrt();
+        if size > NO_MOBILITY * dot(&row, &row).sqrt() {
+            direction = direction.map(|x| x / size);
+            let by = (value - dot(&row, y)) / dot(&row, &direction);
+            y.iter_mut().zip(&direction).for_each(|(y, x)| *y += by * x);
+            directions.push(direction);
         }
     }
 }

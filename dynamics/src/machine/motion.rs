@@ -17,14 +17,11 @@ use super::flight::Flight;
 use super::modes::{MOST_CURVES, Modes};
 use super::watch::{Moment, Roots, Watch};
 use super::{Numbers, PhasePoint};
-use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
+use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, ON_WALL, Side};
 use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, Remark, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop,
     Work,
 };
-
-/// Largest distance of a gap from its wall that counts as rounding, relative to the wall's position and to the scale of length.
-const ON_WALL: f64 = 1e-9;
 
 /// The motion of a machine, with any number of tangent vectors.
 #[derive(Clone, Debug)]
@@ -223,6 +220,10 @@ impl<'s> MachineMotion<'s> {
             self.change = 1;
         }
         self.shift_back(observer);
+        if !self.system.ties.is_empty() {
+            self.system.hold(&self.modes, &mut self.point, false);
+            self.hold_tangents();
+        }
         self.period += 1;
         (self.events_in_period, self.steps_in_period) = (0, 0);
         Ok(())
@@ -390,6 +391,9 @@ impl<'s> MachineMotion<'s> {
             ((!self.tangents.is_empty()).then(|| moment.function(watch)), moment.distance(watch));
         if let Some((gap, at, _)) = distance {
             self.point[gap] = at;
+        }
+        if !self.system.ties.is_empty() {
+            self.system.hold(&self.modes, &mut self.point, false);
         }
         self.before = self.point;
         self.jumps.clear();

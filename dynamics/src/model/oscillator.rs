@@ -52,11 +52,14 @@ pub(super) const MATRIX_TOLERANCE: f64 = 1e-12;
 /// Lower bound of [`Oscillator::length_scale`], which must not be zero.
 pub(crate) const LEAST_LENGTH: f64 = 1e-150;
 
+/// Largest distance of a gap from its wall that counts as rounding, relative to the wall's position and to the scale of length.
+pub(crate) const ON_WALL: f64 = 1e-9;
+
 /// Largest number of coordinates.
 pub const MOST_COORDINATES: usize = 8;
 
 /// Largest number of gaps.
-pub const MOST_GAPS: usize = 3;
+pub const MOST_GAPS: usize = 6;
 
 /// Largest number of signals.
 pub const MOST_SIGNALS: usize = 4;
@@ -163,7 +166,7 @@ impl Wall {
 /// A gap and its walls.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GapRow {
-    /// Row of displacements; not zero, and independent of the rows of the other gaps.
+    /// Row of displacements; not zero. It may depend on the rows of other gaps, such as `x2 - x1` on `x1` and `x2`.
     pub row: DVector<f64>,
     /// Walls on the right, at increasing positions, and on the left, at decreasing positions.
     pub walls: [Vec<Wall>; 2],
@@ -501,7 +504,22 @@ impl Oscillator {
     /// gaps, because walls on which other gaps rest also push.
     pub fn gap_impulse(&self, gap: usize, [before, after]: [&State; 2]) -> f64 {
         let jump = |gap: usize| self.gap_value(gap, after, 1) - self.gap_value(gap, before, 1);
-        if self.gaps.len() == 1 { jump(0) / self.mobility(0) } else { self.impulses(jump)[gap] }
+        if self.gaps.len() == 1 {
+            return jump(0) / self.mobility(0);
+        }
+        let all: Vec<usize> = (0..self.gaps.len()).collect();
+        if self.independent_gaps(&all).len() == all.len() {
+            return self.impulses(&all, jump)[gap];
+        }
+        // The jumps do not determine the impulses of dependent gaps, but only walls on which gaps lie push.
+        let length = self.length_scale();
+        let lies = |&other: &usize| {
+            let z = self.gap_value(other, before, 0);
+            let near = |wall: &Wall| (z - wall.at).abs() <= ON_WALL * wall.at.abs().max(length);
+            other != gap && self.gaps[other].walls.iter().flatten().any(near)
+        };
+        let pushing: Vec<usize> = [gap].into_iter().chain(all.into_iter().filter(lies)).collect();
+        self.impulses(&self.independent_gaps(&pushing), jump)[0]
     }
 
     /// Returns `row M^-1 row` for a gap, the change of its rate by a unit impulse along its row.
@@ -513,13 +531,13 @@ impl Oscillator {
         self.mass.clone().cholesky().map_or(f64::NAN, |factors| row.dot(&factors.solve(row)))
     }
 
-    /// Returns the impulses along the rows of all gaps that change the gaps' rates by given jumps; NaN if there are none.
-    fn impulses(&self, jump: impl Fn(usize) -> f64) -> DVector<f64> {
-        let count = self.gaps.len();
+    /// Returns the impulses along the rows of independent gaps that change the gaps' rates by given jumps; NaN if there are none.
+    fn impulses(&self, gaps: &[usize], jump: impl Fn(usize) -> f64) -> DVector<f64> {
+        let count = gaps.len();
         let Some(mass) = self.mass.clone().cholesky() else { return DVector::from_element(count, f64::NAN) };
-        let mobility =
-            DMatrix::from_fn(count, count, |i, j| self.gaps[i].row.dot(&mass.solve(&self.gaps[j].row)));
-        let jumps = DVector::from_fn(count, |gap, _| jump(gap));
+        let row = |i: usize| &self.gaps[gaps[i]].row;
+        let mobility = DMatrix::from_fn(count, count, |i, j| row(i).dot(&mass.solve(row(j))));
+        let jumps = DVector::from_fn(count, |i, _| jump(gaps[i]));
         mobility.cholesky().map_or(DVector::from_element(count, f64::NAN), |factors| factors.solve(&jumps))
     }
 
@@ -532,44 +550,70 @@ impl Oscillator {
     }
 
     /// Chooses one displacement for each gap, by Gaussian elimination: the one with the largest remaining factor in the gap's row, and
-    /// among equal factors the first by `order`.
-    pub(crate) fn displacements_of_gaps(&self, order: impl Fn(usize, usize) -> Ordering) -> Vec<usize> {
-        let mut rows: Vec<DVector<f64>> = self.gaps.iter().map(|gap| gap.row.clone()).collect();
-        let mut chosen = Vec::new();
-        for i in 0..rows.len() {
+    /// among equal factors the first by `order`. Leaves out gaps whose rows depend on those before them. Returns gaps and displacements.
+    pub(crate) fn displacements_of_gaps(
+        &self,
+        gaps: &[usize],
+        order: impl Fn(usize, usize) -> Ordering,
+    ) -> Vec<(usize, usize)> {
+        let mut rows: Vec<DVector<f64>> = gaps.iter().map(|&gap| self.gaps[gap].row.clone()).collect();
+        let mut chosen: Vec<(usize, usize)> = Vec::new();
+        for (i, &gap) in gaps.iter().enumerate() {
             let row = rows[i].clone();
-            let others = (0..self.degrees()).filter(|j| !chosen.contains(j));
+            let others = (0..self.degrees()).filter(|j| chosen.iter().all(|&(_, pivot)| pivot != *j));
             let largest = others.min_by(|&a, &b| row[b].abs().total_cmp(&row[a].abs()).then(order(a, b)));
-            let pivot = largest.expect("there are not more gaps than coordinates");
+            let least = MATRIX_TOLERANCE * self.gaps[gap].row.amax();
+            let Some(pivot) = largest.filter(|&j| row[j].abs() > least) else { continue };
             for other in &mut rows[i + 1..] {
                 let share = other[pivot] / row[pivot];
                 *other -= &row * share;
             }
-            chosen.push(pivot);
+            chosen.push((gap, pivot));
         }
         chosen
     }
 
+    /// Returns those of the gaps, in their order, whose rows do not depend on the rows before them.
+    pub(crate) fn independent_gaps(&self, gaps: &[usize]) -> Vec<usize> {
+        self.displacements_of_gaps(gaps, |a, b| a.cmp(&b)).into_iter().map(|(gap, _)| gap).collect()
+    }
+
+    /// Returns the gaps whose rows do not depend on the rows of earlier gaps.
+    pub fn leading_gaps(&self) -> Vec<usize> {
+        self.independent_gaps(&(0..self.gaps.len()).collect::<Vec<_>>())
+    }
+
     /// Moves each gap that is beyond a rigid wall onto this wall, and returns the state. For each gap, one displacement
-    /// changes, which `displacements_of_gaps` chooses. All velocities stay.
+    /// changes, which `displacements_of_gaps` chooses. Gaps that depend on moved gaps change, too, and are moved next if they are then
+    /// beyond a wall. All velocities stay.
     pub fn put_on_walls(&self, start: &[f64]) -> State {
         let limit = |gap: &GapRow, side: Side| match gap.walls[side.index()].last() {
             Some(wall) if wall.contact == Contact::Rigid => wall.at,
             _ => side.sign() * f64::INFINITY,
         };
-        let moves = DVector::from_iterator(
-            self.gaps.len(),
-            self.gaps.iter().map(|gap| {
-                let value = gap.row.iter().zip(start.iter().step_by(2)).map(|(a, x)| a * x).sum::<f64>();
+        let (mut moved, mut order): (State, Vec<usize>) = (state(start), (0..self.gaps.len()).collect());
+        let (dependent, mut placed) = (order.len() - self.independent_gaps(&order).len(), Vec::new());
+        for _ in 0..=dependent {
+            let move_of = |gap: &GapRow| {
+                let value = gap.row.iter().zip(moved.iter().step_by(2)).map(|(a, x)| a * x).sum::<f64>();
                 value.min(limit(gap, Side::Right)).max(limit(gap, Side::Left)) - value
-            }),
-        );
-        let mut moved = state(start);
-        if moves.iter().any(|&by| by != 0.0) {
-            let pivots = self.displacements_of_gaps(|a, b| a.cmp(&b));
-            let rows = DMatrix::from_fn(pivots.len(), pivots.len(), |i, k| self.gaps[i].row[pivots[k]]);
-            let by = rows.lu().solve(&moves).expect("the rows of the gaps are independent");
-            pivots.iter().zip(&by).for_each(|(pivot, by)| moved[2 * pivot] += by);
+            };
+            let moves: Vec<f64> = self.gaps.iter().map(move_of).collect();
+            let beyond = |&gap: &usize| moves[gap] != 0.0 && !placed.contains(&gap);
+            let beyond: Vec<usize> = (0..self.gaps.len()).filter(beyond).collect();
+            if beyond.is_empty() {
+                break;
+            }
+            placed.extend(beyond);
+            if dependent > 0 {
+                order.sort_by_key(|gap| placed.iter().position(|other| other == gap).unwrap_or(usize::MAX));
+            }
+            let pivots = self.displacements_of_gaps(&order, |a, b| a.cmp(&b));
+            let count = pivots.len();
+            let rows = DMatrix::from_fn(count, count, |i, k| self.gaps[pivots[i].0].row[pivots[k].1]);
+            let by = DVector::from_fn(count, |i, _| moves[pivots[i].0]);
+            let by = rows.lu().solve(&by).expect("the rows are independent");
+            pivots.iter().zip(&by).for_each(|((_, pivot), by)| moved[2 * pivot] += by);
         }
         moved
     }
@@ -615,7 +659,7 @@ impl Oscillator {
             require((1..=most).contains(&count), || what.to_owned(), count as f64, range)
         };
         count("coordinates", n, MOST_COORDINATES, "1 to 8")?;
-        count("gaps", self.gaps.len(), MOST_GAPS.min(n), "1 to 3, and not more than coordinates")?;
+        count("gaps", self.gaps.len(), MOST_GAPS, "1 to 6")?;
         count("the number of stages", stages, MOST_STAGES, "1 to 64")?;
         let elements = self.friction.len();
         require(
@@ -684,9 +728,9 @@ impl Oscillator {
                 _ => format!(" of gap {}", i + 1),
             };
             all_finite(|| format!("row of gap {}", i + 1), &gap.row)?;
-            let (largest, is_only) = (gap.row.amax(), self.gaps.len() == 1);
-            let name = || "the largest entry of the gap row".to_owned();
-            require(largest > 0.0 || !is_only, name, largest, "different from 0")?;
+            let largest = gap.row.amax();
+            let name = || format!("the largest entry of the gap row{of_gap}");
+            require(largest > 0.0, name, largest, "different from 0")?;
             Side::BOTH.into_iter().try_for_each(|side| self.validate_walls(&of_gap, gap, side))?;
             if let [Some(right), Some(left)] = gap.walls.each_ref().map(|walls| walls.first())
                 && (right.at < left.at
@@ -701,10 +745,18 @@ impl Oscillator {
                 require(independent > MATRIX_TOLERANCE, || format!("{what} 1 to {count}"), independent, range)
             })
         };
+        let leading = self.leading_gaps();
+        let numbers = n + self.gaps.len() - leading.len();
+        require(
+            numbers <= MOST_COORDINATES,
+            || "coordinates and gaps whose rows depend on those of other gaps".to_owned(),
+            numbers as f64,
+            "at most 8 together",
+        )?;
         rows(
-            self.gaps.iter().map(|gap| &gap.row).collect(),
+            leading.iter().map(|&gap| &self.gaps[gap].row).collect(),
             "independence of the rows of the gaps",
-            "above 1e-12: no row may be 0 or a sum of multiples of the others, and all walls along one row belong to one gap",
+            "above 1e-12, or else exactly a sum of multiples of the rows before it",
         )?;
         for (i, DryFriction { row, force, at_speed, static_force, speed }) in (1..).zip(&self.friction) {
             let name = |what: &'static str| move || format!("{what} of friction {i}");

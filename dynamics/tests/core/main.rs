@@ -6,6 +6,7 @@ mod common;
 mod any_oscillator;
 mod bits;
 mod cells;
+mod dependent;
 mod elastic;
 mod flow;
 mod friction;

@@ -63,13 +63,13 @@ impl Starts {
         state(&[(z - g2 * x2) / g1, speed * v1, x2, speed * v2])
     }
 
-    /// Returns a random start of any number of coordinates: all gaps lie between their first walls.
+    /// Returns a random start of any number of coordinates: all gaps with independent rows lie between their first walls.
     fn random_of_all(&self, nth: usize, oscillator: &Oscillator) -> State {
         let (draws, length, n) = (&self.further[nth - 1], oscillator.length_scale(), oscillator.degrees());
         let (positions, rates) = draws.split_at(n);
         let mut placed: Vec<f64> = positions.iter().map(|x| START_RANGE * length * x).collect();
-        for ((gap, share), z) in oscillator.gaps.iter().zip(positions).zip(&mut placed) {
-            *z = between(first_walls(gap), length, *share);
+        for ((gap, share), z) in oscillator.leading_gaps().into_iter().zip(positions).zip(&mut placed) {
+            *z = between(first_walls(&oscillator.gaps[gap]), length, *share);
         }
         let displacements = System::new(oscillator).displacements(&placed);
         let speed = START_RANGE * length * oscillator.omega;

@@ -227,10 +227,25 @@ impl Flight {
         self.gaps[gap].contact()
     }
 
-    /// Returns the dimensionless coordinates and rates `(d1, w1, d2, w2, ...)`.
+    /// Returns the independent ones of the dimensionless coordinates, and their rates, `(d1, w1, d2, w2, ...)`.
     pub(super) fn coordinates(&self) -> Vec<f64> {
-        let n = self.system.n;
-        (0..2 * n).map(|i| self.y[i / 2 + n * (i % 2)]).collect()
+        let leading = self.system.leading.iter();
+        leading.flat_map(|&i| [self.y[i], self.y[self.system.n + i]]).collect()
+    }
+
+    /// Computes dependent gaps again from the others, except those on their walls.
+    fn tie(&mut self) {
+        let (n, system) = (self.system.n, self.system.clone());
+        for gap in (0..system.gaps()).filter(|gap| !system.leading.contains(gap)) {
+            let lies = matches!(self.gaps[gap].mode, Mode::Stuck(_)) || self.gaps[gap].on_wall.is_some();
+            let row = system.gap_row(gap);
+            if !lies {
+                self.y[gap] = dot(row.as_slice(), &self.y[..n]);
+            }
+            if !lies || self.rate(gap) != 0.0 {
+                self.y[n + gap] = dot(row.as_slice(), &self.y[n..2 * n]);
+            }
+        }
     }
 
     /// Shifts all displacements along a direction that changes no gap.
@@ -263,7 +278,8 @@ impl Flight {
         };
         let projected = |kind: usize, of: [bool; MOST_FRICTION]| {
             let rows: Vec<DVector<f64>> = gaps().chain(elements(of)).collect();
-            let mut part = DVector::from_fn(n, |i, _| by[2 * i + kind]);
+            let of_leading = DVector::from_fn(system.leading.len(), |i, _| by[2 * i + kind]);
+            let mut part = &system.spread * of_leading;
             let speeds = vec![0.0; rows.len()];
             Constraints::new(&system.mobility, &rows).project(&system.mobility, &mut part, &speeds);
             part
@@ -339,8 +355,8 @@ impl Flight {
         for gap in 0..system.gaps() {
             let Gap { mode, level, on_wall, from_force, .. } = self.gaps[gap];
             if let Mode::Stuck(side) = mode {
-                let push = domain.pushes[gap].expect("rows of gaps are independent");
-                add(Ending::PulledOff(gap, side), push, 0);
+                // Without a push, other walls hold the gap.
+                domain.pushes[gap].into_iter().for_each(|push| add(Ending::PulledOff(gap, side), push, 0));
             }
             if matches!(mode, Mode::Stuck(_)) || self.is_kept(domain, gap) {
                 continue;
@@ -461,6 +477,7 @@ impl Flight {
             let Some((i, begun, start, guess)) = found else {
                 self.y = end;
                 self.leave_walls(&domain, rest);
+                self.tie();
                 t = until;
                 continue;
             };

@@ -292,7 +292,7 @@ impl MachineMotion<'_> {
             after: [self.point[gap], self.point[n + gap], 0.0, 0.0],
             meshing,
             has_impact: !place.contact.is_elastic() && kind != EventKind::MeshEnd && !self.jumps.is_empty(),
-            code: of_wall + 4 * kind as u64 + 256 * (gap + 4 * wall) as u64,
+            code: of_wall + 4 * kind as u64 + 256 * (gap + 8 * wall) as u64,
             interval: 0,
             ends_series: false,
         };

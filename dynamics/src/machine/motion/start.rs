@@ -146,7 +146,7 @@ impl<'s> MachineMotion<'s> {
         let state = self.state();
         for gap in 0..system.gaps() {
             let row = &system.machine.gaps[gap].row;
-            let size: f64 = (0..n).map(|i| (row[i] * state[2 * i]).abs()).sum();
+            let size: f64 = row.iter().enumerate().map(|(i, x)| (x * state[2 * i]).abs()).sum();
             for side in Side::BOTH {
                 for (number, wall) in system.walls(gap, side).iter().enumerate() {
                     let is_on_wall =

@@ -21,7 +21,7 @@ impl MachineMotion<'_> {
 
     /// Returns the unit vectors of a state.
     pub fn unit_tangents(system: &System) -> Vec<Numbers> {
-        (0..2 * system.n).map(|i| std::array::from_fn(|j| f64::from(u8::from(i == j)))).collect()
+        (0..2 * system.degrees()).map(|i| std::array::from_fn(|j| f64::from(u8::from(i == j)))).collect()
     }
 
     /// Returns the tangent vectors, divided by the exponential of [`log_scale`](Self::log_scale).
@@ -37,7 +37,9 @@ impl MachineMotion<'_> {
     /// Returns the matrix whose columns are the tangent vectors.
     pub fn derivative(&self) -> DMatrix<f64> {
         let columns = self.tangents();
-        DMatrix::from_fn(2 * self.system.n, columns.len(), |i, j| columns[j][i] * self.log_scale.exp())
+        DMatrix::from_fn(2 * self.system.degrees(), columns.len(), |i, j| {
+            columns[j][i] * self.log_scale.exp()
+        })
     }
 
     /// Carries the tangents along a part of a step.

@@ -38,6 +38,8 @@ pub(crate) enum Structure {
     },
     /// It is its own mirror image half a period later.
     Symmetric,
+    /// It has so many more gaps, whose rows depend on those of the others.
+    Dependent(usize),
 }
 
 type Vector = DVector<f64>;
@@ -251,6 +253,13 @@ pub(crate) fn case_of(structure: Structure, seed: u64, shape: Shape) -> Case {
             rows.pop();
         }
     }
+    let leading = rows.clone();
+    if let Structure::Dependent(more) = structure {
+        for _ in 0..more {
+            let [a, b] = [0; 2].map(|_| &rows[random.below(rows.len())] * [1.0, -1.0, 0.5][random.below(3)]);
+            rows.push(if (&a + &b).norm() > 0.2 { a + b } else { a });
+        }
+    }
     let forces = &machine.stages[0];
     let rest = match &across {
         None => forces.stiffness.clone().lu().solve(&forces.load).expect("a stiffness"),
@@ -279,7 +288,7 @@ pub(crate) fn case_of(structure: Structure, seed: u64, shape: Shape) -> Case {
         }
         machine.gaps.push(GapRow { row: row.clone(), walls });
     }
-    add_friction(random, &mut machine, shape.friction, &rows, speeds);
+    add_friction(random, &mut machine, shape.friction, &leading, speeds);
     for friction in &mut machine.friction {
         if structure == (Structure::Drifting { is_damped: false }) {
             friction.row = projected(&friction.row);
@@ -366,6 +375,24 @@ pub(crate) fn structured_case(seed: u64) -> Case {
     let structures =
         [Structure::Drifting { is_damped: seed.is_multiple_of(2) }, Structure::Symmetric, Structure::Any];
     case_of(structures[(seed % 3) as usize], seed, shape)
+}
+
+/// Shapes without their dependent gaps, and the number of these.
+const DEPENDENT: [(Shape, usize); 8] = [
+    (Shape { coordinates: 1, gaps: 1, harmonics: 1, stages: 1, friction: 0, walls: 1 }, 1),
+    (Shape { coordinates: 2, gaps: 2, harmonics: 1, stages: 1, friction: 0, walls: 1 }, 1),
+    (Shape { coordinates: 3, gaps: 2, harmonics: 2, stages: 2, friction: 1, walls: 2 }, 1),
+    (Shape { coordinates: 3, gaps: 3, harmonics: 1, stages: 1, friction: 0, walls: 1 }, 3),
+    (Shape { coordinates: 4, gaps: 4, harmonics: 1, stages: 1, friction: 1, walls: 1 }, 0),
+    (Shape { coordinates: 5, gaps: 3, harmonics: 3, stages: 1, friction: 2, walls: 2 }, 2),
+    (Shape { coordinates: 6, gaps: 5, harmonics: 1, stages: 2, friction: 0, walls: 2 }, 1),
+    (Shape { coordinates: 8, gaps: 6, harmonics: 2, stages: 1, friction: 1, walls: 3 }, 0),
+];
+
+/// Returns the machine of a seed with up to six gaps, whose rows may depend on each other.
+pub(crate) fn dependent_case(seed: u64) -> Case {
+    let (shape, more) = DEPENDENT[(seed % DEPENDENT.len() as u64) as usize];
+    case_of(Structure::Dependent(more), seed, shape)
 }
 
 /// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.

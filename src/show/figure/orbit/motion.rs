@@ -185,10 +185,10 @@ mod tests {
             event(EventKind::MeshEnd, 1.5),
         ];
         let trace = [sample(0.0, None), sample(0.7, right), sample(1.2, right), sample(2.0, None)];
-        let motion = DrawnMotion::new(&events, &trace, [None, left, None], 2.0);
-        let contacts: Vec<_> = motion.pieces.iter().map(|piece| piece.contacts).collect();
-        let expected = [[None, left, None], [right, left, None], [right, None, None], [None; 3]];
-        assert_eq!(contacts, expected);
+        let motion = DrawnMotion::new(&events, &trace, [None, left, None, None, None, None], 2.0);
+        let contacts: Vec<_> =
+            motion.pieces.iter().map(|piece| [piece.contacts[0], piece.contacts[1]]).collect();
+        assert_eq!(contacts, [[None, left], [right, left], [right, None], [None; 2]]);
         assert_eq!(motion.meshing_walls(1).len(), 1);
         assert!(motion.pieces[2].is_in_contact(&[0, 1]) && !motion.pieces[2].is_in_contact(&[1]));
         assert_eq!([0, 1, 2].map(|gap| motion.walls(gap).len()), [1, 1, 0]);

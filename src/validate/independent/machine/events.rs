@@ -126,7 +126,7 @@ impl Flight {
     fn size_of_gap(&self, gap: usize) -> f64 {
         let row = &self.system.machine.gaps[gap].row;
         let state = self.state();
-        (0..self.system.n).map(|i| (row[i] * state[2 * i]).abs()).sum::<f64>() / self.system.units[0]
+        row.iter().enumerate().map(|(i, x)| (x * state[2 * i]).abs()).sum::<f64>() / self.system.units[0]
     }
 
     /// Ends the present modes. `t` is the time since phase 0.
@@ -272,13 +272,16 @@ impl Flight {
             let is_released = |at: usize| set >> at & 1 == 1;
             let holding: Vec<(usize, Side)> =
                 (0..resting.len()).filter(|&at| !is_released(at)).map(|at| resting[at]).collect();
-            // Impulses along the gaps, of the walls on which gaps rest and of the wall that is hit.
+            // Impulses along the gaps, of the walls on which gaps rest and of the wall that is hit. A gap that others hold needs no impulse.
+            let is_held = |i: usize| holding.iter().any(|&(other, _)| other == i);
+            let rows: Vec<_> = holding.iter().map(|&(other, _)| system.gap_row(other)).collect();
+            let independent = Constraints::new(&system.mobility, &rows).kept;
+            let holding: Vec<(usize, Side)> = independent.into_iter().map(|at| holding[at]).collect();
             let gaps: Vec<usize> = holding.iter().map(|&(other, _)| other).chain([gap]).collect();
             let among = DMatrix::from_fn(gaps.len(), gaps.len(), |i, j| system.mobility[(gaps[i], gaps[j])]);
             let mut rates = DVector::zeros(gaps.len());
             rates[gaps.len() - 1] = 1.0;
             let impulses = among.try_inverse().expect("independent rows") * rates;
-            let is_held = |i: usize| holding.iter().any(|&(other, _)| other == i);
             let change = DVector::from_fn(system.n, |i, _| match is_held(i) {
                 true => 0.0,
                 false => gaps
@@ -672,7 +675,7 @@ impl Flight {
         rows.extend(sticking().map(|(element, _)| element.row.clone()));
         speeds.extend(sticking().map(|(element, _)| element.speed));
         if rows.is_empty() {
-            return;
+            return self.tie();
         }
         let mut w = DVector::from_column_slice(&self.y[n..2 * n]);
         let constraints = Constraints::new(&system.mobility, &rows);
@@ -685,6 +688,7 @@ impl Flight {
             let is_zero = (domain.is_still[i] || had_none) && w[i].abs() <= ROUNDING * largest;
             self.y[n + i] = if is_zero { 0.0 } else { w[i] };
         }
+        self.tie();
     }
 
     /// Processes a sliding rate that has become 0.

@@ -238,13 +238,17 @@ pub(super) struct System {
     /// The dimensionless machine, in the coordinates `d`.
     pub(super) machine: Oscillator,
     pub(super) n: usize,
+    /// Independent coordinates. The others are gaps whose rows depend on those of earlier gaps, which no force of free motion acts on.
+    pub(super) leading: Vec<usize>,
+    /// All coordinates as sums of multiples of the independent ones.
+    pub(super) spread: DMatrix<f64>,
     /// Combinations of coordinates that give the displacements, divided by `units[0]`.
     from_coordinates: DMatrix<f64>,
     to_coordinates: DMatrix<f64>,
     /// Units of displacements and velocities.
     pub(super) units: [f64; 2],
     pub(super) mobility: DMatrix<f64>,
-    /// Inverse factor of the mass matrix.
+    /// Inverse factor of the mass matrix, for forces on all coordinates.
     factor: DMatrix<f64>,
     /// The elements that have a force.
     pub(super) elements: Vec<Element>,
@@ -254,8 +258,16 @@ pub(super) struct System {
 
 impl System {
     pub(super) fn new(machine: &Oscillator, start: &State) -> System {
-        let to_coordinates = coordinates(machine);
-        let from_coordinates = to_coordinates.clone().try_inverse().expect("the rows are independent");
+        let (to_coordinates, leading) = coordinates(machine);
+        let n = to_coordinates.nrows();
+        let inverse = to_coordinates.select_rows(&leading).try_inverse().expect("the rows are independent");
+        let (mut from_coordinates, mut spread) =
+            (DMatrix::zeros(machine.degrees(), n), &to_coordinates * &inverse);
+        for (at, &i) in leading.iter().enumerate() {
+            from_coordinates.set_column(i, &inverse.column(at));
+            spread.row_mut(i).fill(0.0);
+            spread[(i, at)] = 1.0;
+        }
         // A machine without walls and loads has no length, so its start defines the scale of length.
         let of_start = start.iter().step_by(2).fold(0.0f64, |most, x| most.max(x.abs()));
         let length = match machine.length_scale() {
@@ -265,7 +277,8 @@ impl System {
         };
         let units = [length, length * machine.omega];
         let machine = transformed(machine, units, &from_coordinates);
-        let factors = machine.mass.clone().cholesky().expect("the mass matrix is positive definite");
+        let mass = machine.mass.select_rows(&leading).select_columns(&leading);
+        let factors = mass.cholesky().expect("the mass matrix is positive definite");
         // A row along a gap must not have rounding errors in other entries.
         let clean = |row: &DVector<f64>| {
             let least = ROUNDING * row.amax();
@@ -281,10 +294,12 @@ impl System {
             wall: spring.wall,
         };
         System {
-            n: machine.degrees(),
+            n,
             units,
-            mobility: factors.inverse(),
-            factor: factors.l().try_inverse().expect("the factor is regular"),
+            mobility: &spread * factors.inverse() * spread.transpose(),
+            factor: factors.l().try_inverse().expect("the factor is regular") * spread.transpose(),
+            leading,
+            spread,
             elements: machine.friction.iter().filter(|friction| friction.acts()).map(element).collect(),
             springs: machine.springs.iter().map(spring).collect(),
             from_coordinates,
@@ -306,7 +321,7 @@ impl System {
     pub(super) fn to_coordinates(&self, state: &State) -> Numbers {
         let (n, t) = (self.n, &self.to_coordinates);
         let entry = |i: usize, kind: usize| {
-            (0..n).map(|j| t[(i, j)] * state[2 * j + kind]).sum::<f64>() / self.units[kind]
+            (0..t.ncols()).map(|j| t[(i, j)] * state[2 * j + kind]).sum::<f64>() / self.units[kind]
         };
         std::array::from_fn(|i| if i < 2 * n { entry(i % n, i / n) } else { 0.0 })
     }
@@ -315,7 +330,7 @@ impl System {
     pub(super) fn to_state(&self, y: &Numbers) -> State {
         let (n, t) = (self.n, &self.from_coordinates);
         let mut state = REST;
-        for (i, entry) in state[..2 * n].iter_mut().enumerate() {
+        for (i, entry) in state[..2 * t.nrows()].iter_mut().enumerate() {
             let rates = &y[n * (i % 2)..];
             *entry = self.units[i % 2] * (0..n).map(|j| t[(i / 2, j)] * rates[j]).sum::<f64>();
         }
@@ -381,9 +396,11 @@ impl System {
         2 * self.n + 2 * self.machine.drives.len() + 1
     }
 
-    /// Returns the row of `w` of a gap.
+    /// Returns the row of `w` of a gap, in independent coordinates.
     pub(super) fn gap_row(&self, gap: usize) -> DVector<f64> {
-        DVector::from_fn(self.n, |i, _| f64::from(u8::from(i == gap)))
+        let mut row = DVector::zeros(self.n);
+        self.leading.iter().zip(&self.spread.row(gap)).for_each(|(&i, factor)| row[i] = *factor);
+        row
     }
 
     pub(super) fn domain(&self, key: Key) -> Rc<Domain> {
@@ -481,13 +498,17 @@ impl System {
 }
 
 /// Returns the rows of the coordinates: the gaps, and displacements that complete them. Each gap replaces one displacement. It is the
-/// displacement with the largest share in the mobility of the gap's row, after previous gaps are eliminated from this row.
-fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
+/// displacement with the largest share in the mobility of the gap's row, after previous gaps are eliminated from this row. Also returns the
+/// places of independent rows: a gap of whose row nothing is left replaces none.
+fn coordinates(machine: &Oscillator) -> (DMatrix<f64>, Vec<usize>) {
     let n = machine.degrees();
     let mut rest: Vec<DVector<f64>> = machine.gaps.iter().map(|gap| gap.row.clone()).collect();
-    let mut left_out = Vec::new();
+    let (mut left_out, mut leading) = (Vec::new(), Vec::new());
     for i in 0..rest.len() {
         let row = rest[i].clone();
+        if row.amax() <= ROUNDING * machine.gaps[i].row.amax() {
+            continue;
+        }
         let part = |j: usize| row[j] * row[j] / machine.mass[(j, j)];
         let others = (0..n).filter(|j| !left_out.contains(j));
         let most = others.max_by(|&a, &b| part(a).total_cmp(&part(b))).expect("a coordinate for each gap");
@@ -496,11 +517,13 @@ fn coordinates(machine: &Oscillator) -> DMatrix<f64> {
             *other -= &row * share;
         }
         left_out.push(most);
+        leading.push(i);
     }
     let unit = |j: usize| DVector::from_fn(n, |i, _| f64::from(u8::from(i == j)));
     let rows = machine.gaps.iter().map(|gap| gap.row.clone());
     let rows: Vec<_> = rows.chain((0..n).filter(|j| !left_out.contains(j)).map(unit)).collect();
-    DMatrix::from_fn(n, n, |i, j| rows[i][j])
+    leading.extend(machine.gaps.len()..rows.len());
+    (DMatrix::from_fn(rows.len(), n, |i, j| rows[i][j]), leading)
 }
 
 /// Returns a machine in units of displacement and velocity, and in other coordinates. Forces act along the coordinates, and are divided by
