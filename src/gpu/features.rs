@@ -105,7 +105,7 @@ impl Features {
         self.machine.map_or(4, |shape| shape.dim() + MODES)
     }
 
-    fn without_code(self) -> [(bool, &'static str, &'static str); 4] {
+    fn without_code(self) -> [(bool, &'static str, &'static str); 5] {
         let preload = "a wall that only pushes and has a negative preload";
         [
             (

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    self, Drive, Forces, GapRow, Law, MOST_FRICTION, Model, ModelError, Oscillator, OscillatorError,
-    Parameter, Restitution, Shapes, Side, Spring, Timing,
+    self, Drive, Forces, GapRow, Law, Model, ModelError, Oscillator, OscillatorError, Parameter, Restitution,
+    Shapes, Side, Spring, Timing,
 };
 
 use super::contact::{self, Wall, WallLaw, WallSpring};
@@ -251,9 +251,6 @@ fn blame<'e>(error: &'e ModelError, definition: &Definition) -> (Table, &'e str)
     }
     if let Some((_, nth)) = quantity.rsplit_once("of signal ") {
         return (Table::Signal(nth.parse().unwrap_or(1)), "name");
-    }
-    if quantity == "rigid walls" {
-        return (Table::Friction(MOST_FRICTION), "force");
     }
     let side = match (quantity.contains("right wall"), quantity.contains("left wall")) {
         (true, _) => Some(Side::Right),

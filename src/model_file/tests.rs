@@ -856,7 +856,6 @@ force = "mu*k" | force = "mu*a" | m.toml:38:9: `friction.0.force = "mu*a"` does 
 force = "mu*k" | force = ["mu", "k"] | m.toml:38:9: `friction.0.force = ["mu", "k"]` has the wrong type: it must be one number or expression; a list with one value for each stage belongs to stiffness, damping, load and preload
 force = 0.5 | force = "1/0" | m.toml:43:9: `friction.1.force = "1/0"` does not fit: at the defaults of two, force of friction 2 = inf: it must be finite and at least 0
 speed = "u" | speed = "log(-1)" | m.toml:39:9: `friction.0.speed = "log(-1)"` does not fit: at the defaults of two, speed of friction 1 = NaN: it must be a finite number
-stiffness = "100" | | m.toml:43:9: `friction.1.force = 0.5` does not fit: at the defaults of two, rigid walls = 1: it must be 0 with two elements of dry friction, because the forces of both and of the wall are not determined at rest
 [motion] | [[friction]]\nrow = [0, 1]\nforce = 1\n[motion] | `friction = 3 tables` is out of range: it must be at most 2 tables, [[friction]], each with row and force
 "#,
     );

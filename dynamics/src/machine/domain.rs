@@ -101,6 +101,8 @@ pub(super) struct LinearDomain {
     pub(super) accelerations: Vec<Functional>,
     /// Whether the acceleration of each coordinate is exactly 0, because constraints hold it.
     pub(super) is_still: [bool; SIZE],
+    /// Elements whose sliding rate constraints hold.
+    pub(super) is_driven: [bool; MOST_FRICTION],
     /// Damping matrix, with the dampers of contacts.
     pub(super) damping: DMatrix<f64>,
     /// Longest step.
@@ -181,6 +183,12 @@ impl LinearDomain {
                 bound.row_mut(i).fill(0.0);
             }
         }
+        let mut is_driven = [false; MOST_FRICTION];
+        for (element, is_driven) in system.elements.iter().zip(&mut is_driven) {
+            let [left, all] =
+                [&constraints.mobility, &system.mobility].map(|m| (m * &element.row).dot(&element.row));
+            *is_driven = left <= NO_MOBILITY * all;
+        }
         let row = |matrix: &DMatrix<f64>, i: usize| {
             Functional(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
         };
@@ -198,6 +206,7 @@ impl LinearDomain {
             rates: system.orders.iter().map(|order| order * system.machine.omega).collect(),
             accelerations: (0..n).map(|i| row(&bound, i)).collect(),
             is_still,
+            is_driven,
             unit: RADIUS / system.rate(&stiffness, &resistance),
             damping,
             pushes,

@@ -60,8 +60,15 @@ impl System {
         }
     }
 
-    /// Whether the modes of the elements at rest are consistent with the forces at a point.
-    pub(super) fn is_consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> bool {
+    /// Whether the modes of the elements at rest are consistent with the forces at a point. If `may_yield`, a friction force may be at its
+    /// limit while other elements keep the rate 0.
+    pub(super) fn is_consistent(
+        &self,
+        modes: &Modes,
+        at_rest: &AtRest,
+        point: &PhasePoint,
+        may_yield: bool,
+    ) -> bool {
         if *at_rest == AtRest::default() {
             return true;
         }
@@ -79,17 +86,20 @@ impl System {
                 let [value, size] = hold.value_and_size(point);
                 value.abs() <= self.elements[i].static_force + ROUNDING * size
             }),
+            _ if domain.is_driven[i] => may_yield,
             slip => slip.sign() * domain.first_derivative(&self.rate_row(i), point, 1).1 > 0.0,
         })
     }
 
-    /// Returns the first consistent combination of modes. Holding walls and sticking elements are tried first.
+    /// Returns the first consistent combination of modes. Holding walls and sticking elements are tried first. If rows depend on each other,
+    /// the later ones bear no force at first. If no combination is consistent then, friction forces at their limits are tried, too: if
+    /// friction is the same at rest and while sliding, all combinations that are consistent give the same accelerations.
     pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> Option<Modes> {
         let gaps = || (0..self.gaps()).filter_map(|gap| Some((gap, at_rest.gaps[gap]?)));
         let elements = || (0..self.elements.len()).filter(|&i| at_rest.elements[i]);
         let combinations = Slip::ALL.len().pow(elements().count() as u32) << gaps().count();
-        (0..combinations)
-            .map(|mut number| {
+        let all = || {
+            (0..combinations).map(|mut number| {
                 let mut tried = *modes;
                 for i in elements().rev() {
                     (tried.slips[i], tried.pieces[i]) = (Slip::ALL[number % Slip::ALL.len()], 0);
@@ -103,6 +113,8 @@ impl System {
                 }
                 tried
             })
-            .find(|tried| self.is_consistent(tried, at_rest, point))
+        };
+        let fits = |may_yield| all().find(|tried| self.is_consistent(tried, at_rest, point, may_yield));
+        fits(false).or_else(|| fits(true))
     }
 }

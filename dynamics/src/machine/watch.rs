@@ -6,7 +6,7 @@ use super::modes::{GapMode, MOST_CURVES, Modes};
 use super::polynomial::{Fall, Polynomial, Weights, bernstein, first_fall};
 use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
-use crate::motion::Slip;
+use crate::motion::{NO_SPEED, Slip};
 
 /// A condition that ends the present modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +83,14 @@ impl<'a> Moment<'a> {
         self.domain.is_still[gap] && self.point[self.frame.n + gap] == 0.0
     }
 
+    /// Whether other elements at rest keep the sliding rate of an element at 0 whose friction is at its limit.
+    pub(super) fn is_yielding(&self, i: usize) -> bool {
+        let rate = || self.frame.rate_row(i).dot(self.point).abs();
+        self.domain.is_driven[i]
+            && self.modes.slips[i] != Slip::Stick
+            && rate() <= NO_SPEED * self.frame.speed
+    }
+
     /// Lists everything that may end the present modes, gap by gap.
     pub(super) fn list(&self, watches: &mut Vec<Watch>) {
         watches.clear();
@@ -121,6 +129,7 @@ impl<'a> Moment<'a> {
                     watches.extend([Watch::Slips(i, Slip::Forward), Watch::Slips(i, Slip::Backward)]);
                 }
                 Slip::Stick => {}
+                _ if self.is_yielding(i) => {}
                 _ => watches.push(Watch::RateVanishes(i)),
             }
         }

@@ -780,12 +780,6 @@ impl Oscillator {
             all_finite(name("force"), points.iter().map(|point| &point[1]))?;
             increasing(name("elongation"), points.iter().map(|point| point[0]))?;
         }
-        if elements == 2 && n == 2 {
-            let last = self.gaps.iter().flat_map(|gap| gap.walls.iter().filter_map(|walls| walls.last()));
-            let rigid = last.filter(|wall| wall.contact == Contact::Rigid).count();
-            let undetermined = "0 with two elements of dry friction, because the forces of both and of the wall are not determined at rest";
-            require(rigid == 0, || "rigid walls".to_owned(), rigid as f64, undetermined)?;
-        }
         if elements > 0 {
             rows(
                 self.friction.iter().map(|friction| &friction.row).collect(),

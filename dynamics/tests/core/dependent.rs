@@ -1,10 +1,11 @@
-//! Gaps whose rows depend on each other: masses between walls, gears in a ring, and rest on several walls.
+//! Gaps whose rows depend on each other: masses between walls, gears in a ring, and rest on several walls; and friction whose force the
+//! state alone does not determine.
 
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Forces, GapRow, Oscillator, Restitution, Side, Spring, State, Timing, Wall, state,
+    Contact, DryFriction, Forces, GapRow, Oscillator, Restitution, Side, Spring, State, Timing, Wall, state,
 };
 
 use rattlemap_dynamics::motion::Flow;
@@ -218,5 +219,47 @@ fn impulses_of_dependent_gaps_are_those_of_the_walls_that_push() {
     let [before, after] = [[0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.0, 0.5]].map(|y| state(&y));
     for gap in [0, 1] {
         assert!(near(row.gap_impulse(gap, [&before, &after]), 3.0, 1e-13), "gap {gap}");
+    }
+}
+
+/// A mass on a belt hits a rigid wall, with another mass on a belt (HAL hal-01716912).
+#[test]
+fn two_masses_on_belts_and_a_rigid_wall() {
+    let mut belts = machine(&[1.0, 1.0], &[(&[0.0, 1.0], [Some(0.6), None])], 1.0);
+    belts.stages[0].stiffness = DMatrix::from_row_slice(2, 2, &[2.0, -1.0, -1.0, 1.0]);
+    let rows = [[1.0, 0.0], [0.0, 1.0]].map(|row| DVector::from_row_slice(&row));
+    belts.friction = rows.map(|row| DryFriction::new(row, 0.5, 0.3)).to_vec();
+    let exact = [0.395_925_28, 0.242_009_61, 0.519_691_63, 0.011_938_68];
+    assert_near(&after(&belts, &[0.0; 4], 15.0)[..4], &exact, 1e-8, "t = 15");
+}
+
+/// Two masses rest on friction and together on a wall: `x1 + x2 <= 0`. They stay while some forces within the limits hold them, so for a
+/// load of `l1` and `l2` while `|l1 - l2| <= 2` and a push `N >= 0` with `|l1 - N| <= 1` and `|l2 - N| <= 1` exists.
+#[test]
+fn friction_and_a_wall_hold_what_some_of_their_forces_can_hold() {
+    let rows = [[1.0, 0.0], [0.0, 1.0]].map(|row| DVector::from_row_slice(&row));
+    for (load, stays) in [
+        ([3.0, 1.5], true),
+        ([1.5, 3.0], true),
+        ([3.0, 3.0], true),
+        ([0.9, -0.9], true),
+        ([3.0, 0.9], false),
+        ([-1.2, 0.0], false),
+        ([-0.9, 1.2], false),
+    ] {
+        let mut machine = machine(&[1.0, 1.0], &[(&[1.0, 1.0], [Some(0.0), None])], 0.5);
+        machine.stages[0].load = DVector::from_row_slice(&load);
+        machine.friction = rows.clone().map(|row| DryFriction::new(row, 1.0, 0.0)).to_vec();
+        let found = after(&machine, &[0.0; 4], 3.0);
+        assert_eq!(found[..4].iter().all(|x| x.abs() < 1e-12), stays, "{load:?}: {found:?}");
+        // The load on the first mass grows and shrinks again.
+        machine.drives = vec![rattlemap_dynamics::model::Drive {
+            order: 1,
+            cos: DVector::from_row_slice(&[0.4, 0.0]),
+            sin: DVector::zeros(2),
+        }];
+        let keeps = stays && load != [0.9, -0.9];
+        let found = after(&machine, &[0.0; 4], 40.0);
+        assert_eq!(found[..4].iter().all(|x| x.abs() < 1e-12), keeps, "{load:?} and a force: {found:?}");
     }
 }

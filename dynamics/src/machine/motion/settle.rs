@@ -89,7 +89,7 @@ impl MachineMotion<'_> {
             };
         }
         for i in 0..self.system.elements.len() {
-            at_rest.elements[i] = self.modes.slips[i] == Slip::Stick;
+            at_rest.elements[i] = self.modes.slips[i] == Slip::Stick || self.moment().is_yielding(i);
         }
         at_rest
     }
@@ -108,10 +108,11 @@ impl MachineMotion<'_> {
             for i in 0..MOST_FRICTION {
                 at_rest.elements[i] &= !exempt.elements[i];
             }
-            if self.system.is_consistent(&self.modes, &at_rest, &self.point) {
+            if self.system.is_consistent(&self.modes, &at_rest, &self.point, false) {
                 break;
             }
             match self.system.consistent(&self.modes, &at_rest, &self.point) {
+                Some(chosen) if chosen == self.modes => break,
                 Some(chosen) => self.change_modes(&chosen, None, observer),
                 None => {
                     self.near_grazing = true;

@@ -298,11 +298,6 @@ pub(crate) fn case_of(structure: Structure, seed: u64, shape: Shape) -> Case {
         }
     }
     machine.friction.retain(|friction| friction.row.norm() > 0.2);
-    if machine.friction.len() > 1 {
-        // Two elements of friction and a rigid wall are refused.
-        let walls = machine.gaps.iter_mut().flat_map(|gap| gap.walls.iter_mut().flatten());
-        walls.filter(|wall| wall.contact == Contact::Rigid).for_each(|wall| wall.contact = Contact::Impact);
-    }
     machine.validate().unwrap_or_else(|error| panic!("{seed}: {error}: {machine:?}"));
     let start =
         (0..2 * n).map(|i| if i % 2 == 0 { rest[i / 2] } else { random.even(0.7 * speeds) }).collect();
