@@ -141,7 +141,7 @@ impl Features {
 mod tests {
     use super::*;
     use crate::model_file::FileModel;
-    use rattlemap_dynamics::model::Model;
+    use rattlemap_dynamics::model::{Model, Oscillator};
     use rattlemap_dynamics::motion::Flow;
 
     /// Lanes and reference use the same engine for a model, whatever its values are.
@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn lanes_refuse_dependent_gaps() {
         let mut oscillator = FileModel::built_in("two-loose-gears").unwrap().oscillator().unwrap();
-        let reason = |oscillator| Features::of(oscillator).needing_reference();
+        let reason = |oscillator: &Oscillator| Features::of(oscillator).needing_reference();
         assert_eq!(reason(&oscillator), None);
         let mut third = oscillator.gaps[1].clone();
         third.row += &oscillator.gaps[0].row;
