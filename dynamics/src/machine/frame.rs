@@ -33,9 +33,16 @@ pub(super) struct SpringElement {
     pub(super) row: DVector<f64>,
     pub(super) curve: Curve,
     pub(super) wall: Option<(usize, Side)>,
+    /// Whether the force is negative somewhere from the first point on.
+    may_pull: bool,
 }
 
 impl Element {
+    /// Whether the force falls when sliding begins, so that accelerations jump.
+    pub(super) fn falls(&self) -> bool {
+        self.static_force > self.curve.at(0.0)
+    }
+
     /// Returns the sliding rate for given rates of the coordinates, and the sum of the moduli of its terms. Rounding errors are relative to
     /// this sum.
     pub(super) fn rate_and_size(&self, rates: &[f64]) -> [f64; 2] {
@@ -148,6 +155,7 @@ impl Frame {
             row: in_flow(&spring.row),
             curve: spring.curve(),
             wall: spring.wall,
+            may_pull: spring.may_pull(),
         };
         let springs = machine.springs.iter().map(spring).collect();
         let period = machine.period();
@@ -214,9 +222,8 @@ impl Frame {
             scaled.min() < -1e-12 * scaled.amax()
         };
         let falls = |spring: &SpringElement| spring.curve.pieces.iter().any(|[slope, _]| *slope < 0.0);
-        let mut free = self.springs.iter().filter(|spring| spring.wall.is_none());
         self.stages.len() > 1
-            || free.any(falls)
+            || self.springs.iter().any(falls)
             || self.stages.iter().any(|forces| is_negative(&forces.stiffness) || is_negative(&forces.damping))
     }
 
@@ -276,11 +283,14 @@ impl Frame {
         spring.map(|spring| MOST_FRICTION + spring)
     }
 
-    /// Returns the last wall of a side if it only pushes and has a damper or a preload. Without both it never pulls, like any elastic wall.
+    /// Returns the last wall of a side if it only pushes and has a damper, a preload or a force law that may pull. Without these it never
+    /// pulls, like any elastic wall.
     pub(super) fn pushing(&self, gap: usize, side: Side) -> Option<&Wall> {
         let last = self.walls(gap, side).last()?;
         let differs = last.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
-        (last.contact == Contact::Pushing && differs).then_some(last)
+        let may_pull =
+            || self.curve_of_wall(gap, side).is_some_and(|i| self.springs[i - MOST_FRICTION].may_pull);
+        (last.contact == Contact::Pushing && (differs || may_pull())).then_some(last)
     }
 
     /// Converts a state `(x1, v1, ...)` to `(d1 .. dn, w1 .. wn)`.

@@ -123,6 +123,13 @@ impl Frame {
         (is_last && self.pushing(gap, side).is_some()).then_some(side)
     }
 
+    /// Whether the force of a side's last wall, on its present piece, is 0 only at the wall. There the gap leaves the wall.
+    pub(super) fn vanishes_at_wall(&self, modes: &Modes, gap: usize, side: Side) -> bool {
+        let spring = self.last_wall(gap, side).springs[modes.stage];
+        let is_first = self.curve_of_wall(gap, side).is_none_or(|i| modes.pieces[i] == 0);
+        is_first && spring.damping == 0.0 && spring.preload == 0.0
+    }
+
     /// Returns the row of the force of a side's last wall, positive where it pushes.
     pub(super) fn force(&self, stage: usize, pieces: &Pieces, gap: usize, side: Side) -> Functional {
         let (wall, sign) = (self.last_wall(gap, side), side.sign());

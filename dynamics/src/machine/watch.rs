@@ -106,7 +106,10 @@ impl<'a> Moment<'a> {
                 GapMode::Beyond(_) => {
                     let ahead = |&side: &Side| self.frame.wall_ahead(self.modes, gap, side).is_some();
                     watches.extend(Side::BOTH.into_iter().filter(ahead).map(|side| Watch::Wall(gap, side)));
-                    if let Some(side) = self.frame.pushed(self.modes, gap) {
+                    let pushed = self.frame.pushed(self.modes, gap);
+                    if let Some(side) =
+                        pushed.filter(|&side| !self.frame.vanishes_at_wall(self.modes, gap, side))
+                    {
                         watches.push(Watch::ForceEnds(gap, side));
                     }
                 }
@@ -118,7 +121,10 @@ impl<'a> Moment<'a> {
                 }
                 GapMode::Pressed(side) => watches.push(Watch::Leaves(gap, side)),
                 GapMode::Open(side) => {
-                    watches.extend([Watch::Leaves(gap, side), Watch::ForceBegins(gap, side)]);
+                    watches.push(Watch::Leaves(gap, side));
+                    if !self.frame.vanishes_at_wall(self.modes, gap, side) {
+                        watches.push(Watch::ForceBegins(gap, side));
+                    }
                 }
                 GapMode::Stuck(_) => {}
             }
@@ -274,7 +280,7 @@ impl<'a> Moment<'a> {
     }
 
     /// Whether the linearisation stays valid if the watch's function touches zero within rounding. At an elastic wall without a preload it
-    /// is valid with and without contact.
+    /// is valid with and without contact, and at the limit of sticking with and without sliding, unless the force falls then.
     fn is_harmless(&self, watch: Watch) -> bool {
         match watch {
             Watch::Wall(gap, direction) => {
@@ -283,7 +289,8 @@ impl<'a> Moment<'a> {
                     wall.contact.is_elastic() && wall.springs.iter().all(|spring| spring.preload == 0.0)
                 })
             }
-            Watch::Slips(..) | Watch::Border(..) => true,
+            Watch::Slips(i, _) => !self.frame.elements[i].falls(),
+            Watch::Border(..) => true,
             _ => false,
         }
     }

@@ -233,6 +233,12 @@ impl NonlinearSpring {
         self.points.iter().zip(self.points.iter().rev()).all(opposite)
     }
 
+    /// Whether the force is negative somewhere from the first point on.
+    pub fn may_pull(&self) -> bool {
+        self.curve().pieces.last().is_some_and(|piece| piece[0] < 0.0)
+            || self.points.iter().any(|point| point[1] < 0.0)
+    }
+
     /// Returns the force as a function of the elongation. Its last border is the end of the range, and its first one, without a wall.
     pub fn curve(&self) -> Curve {
         let slope = |[a, b]: [[f64; 2]; 2]| (b[1] - a[1]) / (b[0] - a[0]);

@@ -375,7 +375,9 @@ impl Flight {
             if let Mode::Onset(side) = mode {
                 let row = affine(&domain.accelerations[gap], side.sign(), 0.0, width);
                 add(Ending::PressingEnds(gap, side), row, from_force);
-            } else if let Some(force) = self.force(gap) {
+            } else if let Some(force) = self.force(gap)
+                && !system.is_zero_at_wall(gap, side_of(level), self.stage, &self.pieces)
+            {
                 let side = side_of(level);
                 match mode {
                     Mode::Open => {

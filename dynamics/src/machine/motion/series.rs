@@ -143,8 +143,7 @@ impl<'s> MachineMotion<'s> {
         let (element, mut modes) = (&self.system.elements[i], self.modes);
         modes.slips[i] = Slip::Stick;
         let holds = &self.system.domain(&modes).holds[i];
-        element.static_force > element.curve.at(0.0)
-            && holds.as_ref().is_some_and(|hold| hold.dot(stopped).abs() <= element.static_force)
+        element.falls() && holds.as_ref().is_some_and(|hold| hold.dot(stopped).abs() <= element.static_force)
     }
 
     /// Replaces the rest of a series of impacts by its limit if the rest is short. The gap has just left its wall. Meanwhile everything

@@ -43,8 +43,7 @@ impl MachineMotion<'_> {
         (self.modes.slips[i], self.modes.pieces[i]) = (next, 0);
         let domain = self.refresh();
         // The accelerations jump if friction is larger at rest than while sliding.
-        let element = &system.elements[i];
-        let jumps = element.static_force > element.curve.at(0.0);
+        let jumps = system.elements[i].falls();
         let release_order = if jumps { RELEASE_ORDER - 1 } else { RELEASE_ORDER };
         let freed = || (0..system.gaps()).filter(|&gap| kept[gap] && !domain.is_still[gap]);
         for gap in freed() {

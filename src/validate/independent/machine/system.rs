@@ -88,6 +88,14 @@ pub(super) struct BentSpring {
     pub(super) wall: Option<(usize, Side)>,
 }
 
+impl BentSpring {
+    /// Whether the force is negative beyond a border of its pieces, or far beyond the last one.
+    fn may_pull(&self) -> bool {
+        self.force.borders.iter().any(|at| self.force.at(*at) < 0.0)
+            || self.force.pieces.last().is_some_and(|piece| piece[0] < 0.0)
+    }
+}
+
 /// The equations of motion of one combination of modes.
 #[derive(Debug)]
 pub(super) struct Domain {
@@ -366,6 +374,13 @@ impl System {
         })
     }
 
+    /// Whether the force of a side's last wall, in its first piece, depends on the position alone, so that its root is the wall.
+    pub(super) fn is_zero_at_wall(&self, gap: usize, side: Side, stage: usize, pieces: &Pieces) -> bool {
+        let Some(spring) = self.walls(gap, side).last().map(|wall| wall.springs[stage]) else { return false };
+        let curve = self.springs.iter().position(|spring| spring.wall == Some((gap, side)));
+        spring.damping == 0.0 && spring.preload == 0.0 && curve.is_none_or(|i| pieces[MOST_FRICTION + i] == 0)
+    }
+
     /// Returns the row of the force of a side's last wall, positive away from the wall, if this wall only pushes. None if the force never
     /// pulls behind the wall.
     pub(super) fn pushing(
@@ -376,7 +391,9 @@ impl System {
         pieces: &Pieces,
     ) -> Option<Functional> {
         let wall = self.walls(gap, side).last()?;
-        let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0);
+        let curve = self.springs.iter().position(|spring| spring.wall == Some((gap, side)));
+        let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0)
+            || curve.is_some_and(|i| self.springs[i].may_pull());
         if wall.contact != Contact::Pushing || !may_pull {
             return None;
         }
@@ -384,7 +401,7 @@ impl System {
         let mut row = [0.0; WIDTH];
         (row[gap], row[self.n + gap]) = (s * spring.stiffness, s * spring.damping);
         row[self.width() - 1] = spring.preload - s * spring.stiffness * wall.at;
-        if let Some(i) = self.springs.iter().position(|spring| spring.wall == Some((gap, side))) {
+        if let Some(i) = curve {
             let [slope, force] = self.springs[i].force.pieces[usize::from(pieces[MOST_FRICTION + i])];
             row[gap] += s * slope;
             row[self.width() - 1] += force;
