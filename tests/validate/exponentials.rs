@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::reference_tests::independent::random::{self as one_gap, PLAIN, Shape};
 use crate::reference_tests::machines::motion::{Motion, What};
-use crate::reference_tests::machines::random::{Case, any_case, apart, dependent_case};
+use crate::reference_tests::machines::random::{Case, any_case, apart, bent_case, dependent_case};
 use crate::reference_tests::machines::system::{ANGLE, System};
 
 /// Largest difference of states, relative to the size of the motion.
@@ -151,6 +151,17 @@ fn the_judge_agrees_with_matrix_exponentials_on_1200_models() {
 fn the_judge_agrees_with_matrix_exponentials_on_machines() {
     check((0..30).map(any_case).collect(), MACHINES);
     check((0..30).map(dependent_case).collect(), MACHINES);
+}
+
+#[test]
+fn the_judge_agrees_with_matrix_exponentials_on_machines_with_curves() {
+    check((0..30).map(bent_case).collect(), MACHINES);
+}
+
+#[test]
+#[ignore = "takes a minute"]
+fn the_judge_agrees_with_matrix_exponentials_on_600_machines_with_curves() {
+    check((0..600).map(bent_case).collect(), MACHINES);
 }
 
 #[test]

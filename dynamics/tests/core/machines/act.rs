@@ -33,6 +33,9 @@ struct Joint {
 impl Motion<'_> {
     /// Ends a flight.
     pub(super) fn act(&mut self, end: End, at_start: bool) {
+        if let End::Bends(i, is_next) = end {
+            return self.bend(i, is_next);
+        }
         let (grips, mut stuck, before) = (self.grips.clone(), self.stuck(), self.field());
         let is_still = self.linear().is_still.clone();
         let (n, system) = (self.system.degrees, self.system);
@@ -45,7 +48,10 @@ impl Motion<'_> {
             }
             End::Slips(i, grip) => {
                 let row = self.linear().hold[i].clone();
-                (self.grips[i], self.orders[i], cause) = (grip, 2, Some(i));
+                let friction = &system.machine.friction[i];
+                let order = if friction.static_force > friction.force { 1 } else { 2 };
+                (self.grips[i], self.orders[i], cause) = (grip, order, Some(i));
+                (self.passed[i], self.at_point[i]) = (1, None);
                 Some((one, row))
             }
             End::Crosses(i, direction) => {
@@ -83,11 +89,32 @@ impl Motion<'_> {
                 (gap.mode, gap.leaves, gap.is_unloaded) = (Mode::Plain, None, true);
                 Some((one, row))
             }
+            End::Bends(..) => None,
         };
         self.settle(&grips, &stuck, &is_still, cause, jumps);
         if let Some((reset, row)) = saltation {
             self.jump(&reset, &row, &before);
         }
+    }
+
+    /// Passes a point of a curve, or only touches it. Forces are continuous, so tangents do not jump.
+    fn bend(&mut self, i: usize, is_next: bool) {
+        let (linear, sign) = (self.linear(), if is_next { 1.0 } else { -1.0 });
+        let (mut row, mut order) = (&self.argument(i) * &linear.a * sign, 1);
+        while order < 4 && !self.exceeds_rounding(&row) {
+            (row, order) = (&row * &linear.a, order + 1);
+        }
+        let passes = self.of(&row) > 0.0;
+        if passes {
+            self.passed[i] = if is_next { self.passed[i] + 1 } else { self.passed[i] - 1 };
+            self.check_range(i);
+        }
+        self.at_point[i] = Some((is_next != passes, order));
+    }
+
+    fn exceeds_rounding(&self, row: &Functional) -> bool {
+        let size: f64 = row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum();
+        self.of(row).abs() > ROUNDING * size
     }
 
     /// The state and the tangents are continuous at a change of the stage.
@@ -200,6 +227,8 @@ impl Motion<'_> {
         if walls.is_empty() && sticking.is_empty() {
             return;
         }
+        // Sliding begins in front of the second point.
+        sticking.iter().for_each(|&i| (self.passed[i], self.at_point[i]) = (1, None));
         let (gaps, grips, orders) = (self.gaps.clone(), self.grips.clone(), self.orders.clone());
         let sets = 2usize.pow(walls.len() as u32) * 3usize.pow(sticking.len() as u32);
         for set in 0..sets {
@@ -270,8 +299,7 @@ impl Motion<'_> {
                 continue;
             }
             let row = &linear.acceleration[i];
-            let size: f64 = row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum();
-            let order = if self.of(row).abs() > ROUNDING * size { 2 } else { 3 };
+            let order = if self.exceeds_rounding(row) { 2 } else { 3 };
             if let Mode::Onset(_) = self.gaps[i].mode {
                 self.gaps[i].is_unpressed = order == 3;
                 continue;
@@ -337,6 +365,8 @@ impl Motion<'_> {
             contact => {
                 let origin = self.gaps[i].clone();
                 self.enter(i, direction);
+                // A curve begins with the force 0.
+                self.gaps[i].is_unloaded = self.pushing(i).is_some_and(|row| !self.exceeds_rounding(&row));
                 if contact == Contact::Pushing && !self.closes(i) {
                     self.gaps[i].mode = Mode::Open;
                     return None;
@@ -514,6 +544,7 @@ impl Motion<'_> {
                 let size = self.size_of_rate(&self.system.slides[i]);
                 self.grips[i] = self.grip(i, ROUNDING * (along * change).abs() + SMALL * size);
                 self.orders[i] = 0;
+                self.find_passed(i);
             }
         }
         let kicked: Vec<f64> = self.system.machine.gaps.iter().map(|gap| gap.row.dot(kick)).collect();
@@ -552,11 +583,9 @@ impl Motion<'_> {
 
     fn leave(&mut self, i: usize, side: Side, is_at_rest: bool) {
         let linear = self.linear();
-        let row = &linear.acceleration[i];
-        let size: f64 = row.iter().zip(self.y.iter()).map(|(a, b)| (a * b).abs()).sum();
         let order = match is_at_rest {
             false => 1,
-            true if self.of(row).abs() > ROUNDING * size => 2,
+            true if self.exceeds_rounding(&linear.acceleration[i]) => 2,
             true => 3,
         };
         (self.gaps[i].mode, self.gaps[i].leaves) = (Mode::Plain, Some((side, order)));

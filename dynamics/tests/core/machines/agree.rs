@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::engine::{Follower, Period};
 use super::motion::{Event, Motion, What};
-use super::random::{Case, any_case, apart, dependent_case};
+use super::random::{Case, any_case, apart, bent_case, dependent_case};
 use super::system::{ANGLE, System};
 use crate::independent::random::{self as one_gap, PLAIN, Shape};
 
@@ -253,6 +253,17 @@ mod program {
     #[ignore = "minutes"]
     fn ten_thousand_machines_agree_with_matrix_exponentials() {
         check_program(300..10_300, MACHINES, any_case);
+    }
+
+    #[test]
+    fn machines_with_curves_agree_with_matrix_exponentials() {
+        check_program(0..40, MACHINES, bent_case);
+    }
+
+    #[test]
+    #[ignore = "minutes"]
+    fn two_thousand_machines_with_curves_agree_with_matrix_exponentials() {
+        check_program(0..2_000, MACHINES, bent_case);
     }
 
     const SHAPES: [Shape; 6] = [

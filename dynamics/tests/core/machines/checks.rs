@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::build::{in_coordinates, side_by_side};
 use super::motion::{Event, Motion, What};
-use super::random::{Case, any_case, apart};
+use super::random::{Case, any_case, apart, bent_case};
 use super::system::{ANGLE, System};
 use crate::independent::random::{self as one_gap, PLAIN, Random, Shape};
 
@@ -32,9 +32,9 @@ const STEPS_OFF: f64 = 3e-11;
 const NOISES: f64 = 20.0;
 
 /// Compares motions with larger and smaller steps.
-fn check_steps(seeds: std::ops::Range<u64>) {
+fn check_steps(seeds: std::ops::Range<u64>, case: impl Fn(u64) -> Case + Sync) {
     let run = |seed: u64| {
-        let case = any_case(seed);
+        let case = case(seed);
         let [system, other] = [ANGLE, 0.6 * ANGLE].map(|angle| System::new(&case.machine, angle));
         let mut motion = Motion::new(&system, &case.start);
         let mut shaken = motion.shaken();
@@ -88,9 +88,9 @@ fn check_steps(seeds: std::ops::Range<u64>) {
 }
 
 /// Compares derivatives with differences of motions from neighbouring starts without contact onset, rest and sticking.
-fn check_derivatives(seeds: std::ops::Range<u64>) {
+fn check_derivatives(seeds: std::ops::Range<u64>, case: impl Fn(u64) -> Case + Sync) {
     let run = |seed: u64| {
-        let case = any_case(seed);
+        let case = case(seed);
         let (system, n) = (System::new(&case.machine, ANGLE), case.machine.degrees());
         let mut motion = Motion::new(&system, &case.start);
         let mut found = [0; 3];
@@ -382,19 +382,23 @@ fn other_coordinates_give_the_same_motion() {
 
 #[test]
 fn other_steps_give_the_same_motion() {
-    check_steps(0..300);
+    check_steps(0..300, any_case);
+    check_steps(0..100, bent_case);
 }
 
 #[test]
 fn derivatives_are_limits_of_differences() {
-    check_derivatives(0..200);
+    check_derivatives(0..200, any_case);
+    check_derivatives(0..100, bent_case);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn three_thousand_machines_pass_the_checks() {
-    check_steps(300..3300);
-    check_derivatives(200..1200);
+    check_steps(300..3300, any_case);
+    check_derivatives(200..1200, any_case);
+    check_steps(100..1100, bent_case);
+    check_derivatives(100..1100, bent_case);
     check_side_by_side(2, 60..360, 4, 0.8);
     check_side_by_side(3, 30..130, 4, 0.7);
 }

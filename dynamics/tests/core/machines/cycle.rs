@@ -41,6 +41,8 @@ pub(crate) struct Cycle {
     pub(crate) impacts: usize,
     /// Share of the time in contact.
     pub(crate) meshes: f64,
+    /// Whether a nonlinear spring is beyond its points somewhere.
+    pub(crate) is_out_of_range: bool,
     /// Distance of the end from the start, relative to the size of the motion.
     pub(crate) off: f64,
     /// Largest distance at phase 0 of a motion with larger rounding errors.
@@ -112,6 +114,7 @@ pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
         word: word(&motion),
         impacts: motion.events.iter().filter(|event| event.what == What::Impact).count(),
         meshes: motion.meshing_time / (period as f64 * system.period),
+        is_out_of_range: motion.is_out_of_range,
         off: apart(&motion.state(), &at, rate),
         noise,
         strobes,

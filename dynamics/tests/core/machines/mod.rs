@@ -5,6 +5,7 @@ mod act;
 pub(crate) mod agree;
 mod build;
 mod checks;
+mod curves;
 pub(crate) mod cycle;
 mod cycles;
 pub(crate) mod engine;

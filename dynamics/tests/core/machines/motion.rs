@@ -5,12 +5,12 @@
 use std::rc::Rc;
 
 use nalgebra::DVector;
-use rattlemap_dynamics::model::{Contact, Side};
+use rattlemap_dynamics::model::{Contact, Side, Wall};
 
 use super::random::apart;
 use super::roots::first_fall;
 use super::system::{
-    Functional, Grip, Key, Linear, Matrix, ROUNDING, System, Vector, exponential, product, value,
+    Curve, Functional, Grip, Key, Linear, Matrix, ROUNDING, System, Vector, exponential, product, value,
 };
 
 /// Known relative errors of velocities. They are larger than rounding errors and show their growth.
@@ -92,6 +92,8 @@ pub(super) enum End {
     PulledOff(usize, Side),
     Opens(usize, Side),
     Closes(usize, Side),
+    /// The argument of a curve reaches the next point, or the one before it.
+    Bends(usize, bool),
 }
 
 /// A motion, with the derivative of its state with respect to the start.
@@ -103,6 +105,12 @@ pub(crate) struct Motion<'a> {
     pub(super) grips: Vec<Grip>,
     /// Orders of roots of the sliding rates now.
     pub(super) orders: Vec<usize>,
+    /// Numbers of points that the arguments of curves have passed.
+    pub(super) passed: Vec<usize>,
+    /// For the argument of a curve at a point now: whether this is the next point, and the order of the root.
+    pub(super) at_point: Vec<Option<(bool, usize)>>,
+    /// Whether a nonlinear spring has been beyond its points.
+    pub(crate) is_out_of_range: bool,
     pub(super) y: Vector,
     /// Forcing periods before this one, and time in this one.
     periods: u32,
@@ -180,6 +188,9 @@ impl<'a> Motion<'a> {
             gaps: vec![gap; machine.gaps.len()],
             grips: vec![Grip::Stick; machine.friction.len()],
             orders: vec![0; machine.friction.len()],
+            passed: vec![0; system.curves.len()],
+            at_point: vec![None; system.curves.len()],
+            is_out_of_range: false,
             y: DVector::zeros(system.size()),
             periods: 0,
             t: 0.0,
@@ -198,6 +209,7 @@ impl<'a> Motion<'a> {
         };
         motion.put(start);
         motion.begin_period();
+        (0..system.curves.len()).for_each(|i| motion.find_passed(i));
         for i in 0..machine.gaps.len() {
             motion.find_level(i);
         }
@@ -290,7 +302,11 @@ impl<'a> Motion<'a> {
     }
 
     pub(super) fn key(&self) -> Key {
+        let mut passed = self.passed.clone();
+        let sticks = self.grips.iter().map(|grip| *grip == Grip::Stick);
+        passed.iter_mut().zip(sticks).filter(|(_, sticks)| *sticks).for_each(|(passed, _)| *passed = 0);
         Key {
+            passed,
             stage: self.stage,
             acting: self.gaps.iter().map(Gap::acting).collect(),
             held: self.gaps.iter().map(|gap| matches!(gap.mode, Mode::Stuck(_))).collect(),
@@ -325,7 +341,7 @@ impl<'a> Motion<'a> {
     pub(super) fn pushing(&self, gap: usize) -> Option<Functional> {
         let level = self.gaps[gap].level;
         let nth = usize::from(level.unsigned_abs()).checked_sub(1)?;
-        self.system.pushing(gap, side_of(level), nth, self.stage)
+        self.system.pushing(gap, side_of(level), nth, self.stage, &self.passed)
     }
 
     /// Whether the last wall that the gap has crossed is in contact, by the sign of its force without contact.
@@ -337,14 +353,32 @@ impl<'a> Motion<'a> {
         closes
     }
 
+    /// Returns the row of the argument of a curve.
+    pub(super) fn argument(&self, i: usize) -> Functional {
+        let curve = &self.system.curves[i];
+        self.grips.get(i).map_or_else(|| curve.argument.clone(), |grip| &curve.argument * grip.sign())
+    }
+
+    /// Finds the points that the argument of a curve has passed.
+    pub(super) fn find_passed(&mut self, i: usize) {
+        self.passed[i] = self.system.curves[i].passed(self.of(&self.argument(i)));
+        self.at_point[i] = None;
+        self.check_range(i);
+    }
+
+    /// Notes it if a nonlinear spring is beyond its points.
+    pub(super) fn check_range(&mut self, i: usize) {
+        let ends = [0, self.system.curves[i].points.len()];
+        self.is_out_of_range |= i >= self.grips.len() && ends.contains(&self.passed[i]);
+    }
+
     /// Finds the walls that a gap is behind.
     fn find_level(&mut self, gap: usize) {
         let z = self.of(&self.system.z[gap]);
         for side in Side::BOTH {
             let walls = &self.system.machine.gaps[gap].walls[side.index()];
-            let is_behind = |wall: &&rattlemap_dynamics::model::Wall| {
-                wall.contact != Contact::Rigid && side.sign() * (z - wall.at) > 0.0
-            };
+            let is_behind =
+                |wall: &&Wall| wall.contact != Contact::Rigid && side.sign() * (z - wall.at) > 0.0;
             let count = walls.iter().take_while(is_behind).count();
             if count > 0 {
                 self.gaps[gap].level = step_of(side) * count as i8;
@@ -359,6 +393,7 @@ impl<'a> Motion<'a> {
     fn begin_grips(&mut self) {
         for i in 0..self.grips.len() {
             self.grips[i] = self.grip(i, ROUNDING * self.size_of_rate(&self.system.slides[i]));
+            self.find_passed(i);
         }
         self.decide();
         self.project();
@@ -484,6 +519,7 @@ impl<'a> Motion<'a> {
                 }
                 self.y = to;
                 self.orders.fill(0);
+                self.at_point.fill(None);
                 for (gap, is_still) in self.gaps.iter_mut().zip(&linear.is_still) {
                     gap.is_unloaded = false;
                     if !is_still {
@@ -557,7 +593,18 @@ impl<'a> Motion<'a> {
                 let zeros = c.iter().take_while(|c| **c == 0.0).count().min(c.len() - 1);
                 fall(&c, zeros.max(usize::from(gap.is_unpressed)), End::PressingEnds(i, side));
             }
-            if let (Mode::Plain | Mode::Open, Some(row)) = (gap.mode, self.pushing(i)) {
+            // A force without damper and preload vanishes at the wall in front of the second point of its curve.
+            let of_wall = |curve: &Curve| curve.wall == Some((i, side_of(gap.level)));
+            let curve = self.system.curves.iter().position(of_wall);
+            let vanishes_at_wall = |wall: &Wall| {
+                let spring = wall.springs[self.stage];
+                let is_first = curve.is_none_or(|curve| self.passed[curve] == 1);
+                is_first && spring.damping == 0.0 && spring.preload == 0.0
+            };
+            let walls = &self.system.machine.gaps[i].walls[side_of(gap.level).index()];
+            if let (Mode::Plain | Mode::Open, Some(row)) = (gap.mode, self.pushing(i))
+                && !walls.last().is_some_and(vanishes_at_wall)
+            {
                 let (sign, side) = (if gap.mode == Mode::Open { -1.0 } else { 1.0 }, side_of(gap.level));
                 let end = if gap.mode == Mode::Open { End::Closes(i, side) } else { End::Opens(i, side) };
                 fall(&of(&row, sign), usize::from(gap.is_unloaded), end);
@@ -574,6 +621,25 @@ impl<'a> Motion<'a> {
                 _ => fall(&of(&self.system.slides[i], grip.sign()), self.orders[i], End::Rests(i)),
             }
         }
+        for (i, curve) in self.system.curves.iter().enumerate() {
+            let is_off = curve.wall.is_some_and(|(gap, side)| {
+                let count = self.system.machine.gaps[gap].walls[side.index()].len();
+                self.gaps[gap].level != step_of(side) * count as i8
+            });
+            if is_off || self.grips.get(i) == Some(&Grip::Stick) {
+                continue;
+            }
+            let (row, passed) = (self.argument(i), self.passed[i]);
+            let next = (passed < curve.points.len()).then_some((true, passed));
+            let before = (passed > curve.least).then(|| (false, passed - 1));
+            for (is_next, point) in next.into_iter().chain(before) {
+                let sign = if is_next { -1.0 } else { 1.0 };
+                let mut c = of(&row, sign);
+                c[0] -= sign * curve.points[point][0];
+                let order = self.at_point[i].filter(|at| at.0 == is_next).map_or(0, |at| at.1);
+                fall(&c, order, End::Bends(i, is_next));
+            }
+        }
         ends.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
@@ -581,7 +647,7 @@ impl<'a> Motion<'a> {
     pub(super) fn limits(&self, linear: &Linear, i: usize) -> [(Functional, Grip); 2] {
         [Grip::Plus, Grip::Minus].map(|grip| {
             let mut room = &linear.hold[i] * -grip.sign();
-            room[2 * self.system.degrees] += self.system.machine.friction[i].force;
+            room[2 * self.system.degrees] += self.system.machine.friction[i].static_force;
             (room, grip)
         })
     }

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use rattlemap_dynamics::model::{
-    Contact, Drive, DryFriction, Forces, GapRow, Oscillator, Restitution, Side, Spring, Timing, Wall,
+    Contact, Drive, DryFriction, Forces, GapRow, NonlinearSpring, Oscillator, Restitution, Side, Spring,
+    Timing, Wall,
 };
 
 use super::super::independent::random::Random;
@@ -388,6 +389,102 @@ const DEPENDENT: [(Shape, usize); 8] = [
 pub(crate) fn dependent_case(seed: u64) -> Case {
     let (shape, more) = DEPENDENT[(seed % DEPENDENT.len() as u64) as usize];
     case_of(Structure::Dependent(more), seed, shape)
+}
+
+/// Returns points of a force that is linear between them, with this number of pieces of lengths around `length`. Few pieces fall.
+fn points(random: &mut Random, pieces: usize, first: [f64; 2], length: f64, slope: f64) -> Vec<[f64; 2]> {
+    let mut points = vec![first];
+    for nth in 1..=pieces {
+        let factor = if nth < pieces && random.chance(0.2) { -0.5 * random.unit() } else { 1.0 };
+        let (by, slope) =
+            (length * random.logarithmic(0.3, 2.0), slope * factor * random.logarithmic(0.1, 3.0));
+        let [at, force] = points[nth - 1];
+        points.push([at + by, force + slope * by]);
+    }
+    points
+}
+
+/// Gives friction of a machine other forces at rest and at other rates, and some walls a curve, and adds nonlinear springs within the
+/// amplitudes of their elongations along rows of gaps, or along any row.
+fn bend(random: &mut Random, machine: &mut Oscillator, rest: &Vector, has_any_row: bool) {
+    let (omega, is_symmetric) = (machine.omega, machine.mirror_symmetric());
+    let reaches: Vec<[f64; 2]> = machine.gaps.iter().map(|gap| reach(machine, &gap.row, rest)).collect();
+    let most = reaches.iter().map(|reach| reach[1]).fold(0.05, f64::max);
+    for friction in &mut machine.friction {
+        if random.chance(0.7) {
+            friction.static_force *= random.between(1.0, 2.0);
+        }
+        let mut rate = 0.0;
+        for _ in 0..random.below(4) {
+            rate += most * omega * friction.row.norm() * random.logarithmic(0.03, 0.6);
+            friction.at_speed.push([rate, friction.force * random.logarithmic(0.2, 3.0)]);
+        }
+    }
+    for _ in 0..random.below(3) {
+        let row = match has_any_row && random.chance(0.5) {
+            true => row(random, machine.degrees()),
+            false => machine.gaps[random.below(machine.gaps.len())].row.clone(),
+        };
+        let ([mean, amplitude], row) = (reach(machine, &row, rest), &row);
+        let stiffness = row.dot(&(&machine.stages[0].stiffness * row)) / row.norm_squared().powi(2);
+        let pieces = 1 + random.below(6);
+        let length = 2.0 * amplitude.max(0.05) * random.between(0.7, 1.5) / pieces as f64;
+        let first = [mean - 0.5 * length * pieces as f64, random.even(0.2) * stiffness * amplitude];
+        let slope = stiffness * random.logarithmic(0.1, 2.0);
+        let mut points = points(random, pieces, first, length, slope);
+        if is_symmetric {
+            let last = points[pieces];
+            points.iter_mut().for_each(|point| (0..2).for_each(|i| point[i] -= last[i]));
+            let mirrored: Vec<[f64; 2]> =
+                points.iter().rev().skip(1).map(|point| point.map(|x| -x)).collect();
+            points.extend(mirrored);
+        }
+        let factor = if is_symmetric || random.chance(0.5) { 1.0 } else { -1.0 };
+        machine.springs.push(NonlinearSpring { row: row * factor, points, wall: None });
+    }
+    for gap in 0..machine.gaps.len() {
+        let bent = [0, 1].map(|_| random.chance(0.7));
+        let (depth, slope) = (reaches[gap][1].max(0.05), random.logarithmic(10.0, 300.0));
+        let pieces = 1 + random.below(6);
+        let length = depth * random.logarithmic(0.02, 0.3);
+        let force = points(random, pieces, [0.0, 0.0], length, slope);
+        let pulls = random.chance(0.7);
+        for side in Side::BOTH {
+            let GapRow { row, walls } = &mut machine.gaps[gap];
+            let Some(wall) = walls[side.index()].last_mut() else { continue };
+            if !wall.contact.is_elastic() || !bent[if is_symmetric { 0 } else { side.index() }] {
+                continue;
+            }
+            let pulls = pulls && force.iter().all(|point| point[1] >= 0.0);
+            wall.contact = if pulls { Contact::Elastic } else { Contact::Pushing };
+            wall.springs.iter_mut().for_each(|spring| (spring.stiffness, spring.preload) = (0.0, 0.0));
+            let points = force.iter().map(|[at, force]| [side.sign() * wall.at + at, *force]).collect();
+            let wall = Some((gap, side));
+            machine.springs.push(NonlinearSpring { row: &*row * side.sign(), points, wall });
+        }
+    }
+    assert_eq!(machine.mirror_symmetric(), is_symmetric);
+}
+
+/// Returns the machine of a seed, with forces that are curves. Some have no drive.
+pub(crate) fn bent_case(seed: u64) -> Case {
+    let mut case = bent(any_case(seed), seed, true);
+    if seed % 16 == 1 {
+        case.machine.drives.clear();
+    }
+    case
+}
+
+/// Returns the machine of a seed, with forces that are curves: in turn one that drifts, a symmetric one, and any.
+pub(crate) fn bent_structured_case(seed: u64) -> Case {
+    bent(structured_case(seed), seed, false)
+}
+
+fn bent(mut case: Case, seed: u64, has_any_row: bool) -> Case {
+    let rest = Vector::from_fn(case.machine.degrees(), |i, _| case.start[2 * i]);
+    bend(&mut Random(seed ^ 0x6e5_1d3b), &mut case.machine, &rest, has_any_row);
+    case.machine.validate().unwrap_or_else(|error| panic!("{seed}: {error}: {:?}", case.machine));
+    case
 }
 
 /// Returns the largest difference of two states relative to the larger state, with velocities divided by a rate.

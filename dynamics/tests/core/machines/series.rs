@@ -146,6 +146,8 @@ struct Exact<'a> {
     /// Accelerations without contact and friction.
     free: Vec<Vec<Long>>,
     friction: Long,
+    /// Friction at rest.
+    holds: Long,
     rate: f64,
     mode: Mode,
     /// Gap, other displacement, their rates, cosine and sine of the force, and 1.
@@ -203,7 +205,11 @@ impl<'a> Exact<'a> {
             let part = product(&by, &part);
             (0..n).for_each(|i| all[i].extend(part[i].iter().map(|x| long(sign) * *x)));
         }
-        let friction = machine.friction.first().map_or(0.0, |f| f.force * f.row.norm() / row.norm());
+        let along = |f: &DryFriction, force: f64| force * f.row.norm() / row.norm();
+        let [friction, holds] = machine
+            .friction
+            .first()
+            .map_or([0.0; 2], |f| [f.force, f.static_force].map(|force| along(f, force)));
         let wall = machine.gaps[0].walls.iter().flatten().map(|wall| wall.springs[0]);
         let [k, c] = wall.fold([0.0f64; 2], |[k, c], spring| [k.max(spring.stiffness), c + spring.damping]);
         let mobility = product(&by, &transposed(&to));
@@ -220,6 +226,7 @@ impl<'a> Exact<'a> {
             rate,
             radian: 1.0 / own.max(machine.omega),
             friction: long(friction) * mobility[0][0],
+            holds: long(holds) * mobility[0][0],
             free: all,
             to,
             from,
@@ -339,7 +346,7 @@ impl<'a> Exact<'a> {
             Mode::Rests { on, .. } => {
                 let limit = |s: f64| {
                     let mut row: Vec<Long> = self.push().iter().map(|x| long(s) * *x).collect();
-                    row[2 * n + 2] = row[2 * n + 2] + self.friction;
+                    row[2 * n + 2] = row[2 * n + 2] + self.holds;
                     (row, End::Moves(-s))
                 };
                 match on {
@@ -434,7 +441,7 @@ impl<'a> Exact<'a> {
                 let n = self.n();
                 self.y[n] = ZERO;
                 let push = Self::value(&self.push(), &self.y).0;
-                self.mode = match push.abs() > self.friction.0 {
+                self.mode = match push.abs() > self.holds.0 {
                     true => Mode::Moves { behind, slip: push.signum() },
                     false => Mode::Rests { on: None, behind },
                 };
@@ -462,7 +469,8 @@ impl<'a> Exact<'a> {
         self.impacts += usize::from(!self.is_short);
         let pressing = s.0 * Self::value(&self.push(), &self.y).0;
         let rest = 2.0 * (e * speed).0 / ((1.0 - e.0) * (pressing + self.friction.0));
-        self.is_short |= (0.0..SHORT_REST * self.radian).contains(&rest);
+        // Friction at rest may hold the gap in its flight.
+        self.is_short |= pressing > self.holds.0 && (0.0..SHORT_REST * self.radian).contains(&rest);
         if (e * speed).0 > LIMIT || pressing <= 0.0 {
             return;
         }
@@ -534,7 +542,11 @@ fn described(seed: u64, case: &Case) -> Oscillator {
         1 => {
             let force = random.logarithmic(0.02, 0.3) * machine.drives[0].cos.amax();
             let row = &machine.gaps[0].row * [1.0, -1.0, 0.7][random.below(3)];
-            machine.friction.push(DryFriction::new(row.clone(), force / row.norm(), 0.0));
+            let mut friction = DryFriction::new(row.clone(), force / row.norm(), 0.0);
+            if seed % 8 == 5 {
+                friction.static_force *= random.between(1.0, 3.0);
+            }
+            machine.friction.push(friction);
         }
         _ => {}
     }

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector, RowDVector};
-use rattlemap_dynamics::model::{Contact, Oscillator, Side};
+use rattlemap_dynamics::model::{Contact, DryFriction, NonlinearSpring, Oscillator, Side};
 
 /// A step, in radians of the fastest rate.
 pub(crate) const ANGLE: f64 = 0.6;
@@ -45,6 +45,45 @@ pub(crate) struct Key {
     /// Gaps at rest on rigid walls.
     pub(crate) held: Vec<bool>,
     pub(crate) grips: Vec<Grip>,
+    /// Numbers of points that the arguments of curves have passed.
+    pub(crate) passed: Vec<usize>,
+}
+
+/// A force that is linear between points: of friction as a function of the size of the sliding rate, or of a nonlinear spring.
+pub(crate) struct Curve {
+    pub(crate) points: Vec<[f64; 2]>,
+    /// Slopes in front of the first point and beyond the last one.
+    slopes: [f64; 2],
+    /// Row of the argument, for friction that slides forwards.
+    pub(crate) argument: Functional,
+    /// Gap and side of the wall with which the spring acts.
+    pub(crate) wall: Option<(usize, Side)>,
+    /// Least number of passed points: friction and walls have no force in front of the first point.
+    pub(crate) least: usize,
+}
+
+impl Curve {
+    /// Returns slope and force at 0 of the line beyond a number of passed points.
+    fn line(&self, passed: usize) -> [f64; 2] {
+        let points = &self.points;
+        let slope = match passed {
+            0 => self.slopes[0],
+            last if last == points.len() => self.slopes[1],
+            inner => (points[inner][1] - points[inner - 1][1]) / (points[inner][0] - points[inner - 1][0]),
+        };
+        let [at, force] = points[passed.saturating_sub(1)];
+        [slope, force - slope * at]
+    }
+
+    /// Returns the number of points that an argument has passed.
+    pub(crate) fn passed(&self, argument: f64) -> usize {
+        self.points.iter().filter(|point| point[0] < argument).count().max(self.least)
+    }
+
+    /// Whether the force pulls somewhere, or would do so beyond the last point.
+    fn may_pull(&self) -> bool {
+        self.slopes[1] < 0.0 || self.points.iter().any(|point| point[1] < 0.0)
+    }
 }
 
 /// One linear domain. Rows are applied to the state `y`.
@@ -157,6 +196,8 @@ pub(crate) struct System {
     pub(crate) w: Vec<Functional>,
     /// Rows of the sliding rates.
     pub(crate) slides: Vec<Functional>,
+    /// Forces of friction, then of nonlinear springs.
+    pub(crate) curves: Vec<Curve>,
     angle: f64,
     domains: RefCell<HashMap<Key, Rc<Linear>>>,
 }
@@ -165,7 +206,9 @@ impl System {
     /// Builds the system with steps of `angle` radians of the fastest rate.
     pub(crate) fn new(machine: &Oscillator, angle: f64) -> System {
         let mut machine = machine.clone();
-        machine.friction.retain(|friction| friction.force > 0.0);
+        machine
+            .friction
+            .retain(|one| one.static_force > 0.0 || one.at_speed.iter().any(|point| point[1] > 0.0));
         let degrees = machine.degrees();
         let mut system = System {
             degrees,
@@ -177,23 +220,39 @@ impl System {
             z: Vec::new(),
             w: Vec::new(),
             slides: Vec::new(),
+            curves: Vec::new(),
             angle,
             domains: RefCell::default(),
             machine,
         };
         let rows = |at| system.machine.gaps.iter().map(|gap| system.row(&gap.row, at)).collect();
         let (z, w) = (rows(0), rows(degrees));
-        let slide = |friction: &rattlemap_dynamics::model::DryFriction| {
+        let slide = |friction: &DryFriction| {
             let mut row = system.row(&friction.row, degrees);
             row[2 * degrees] = -friction.speed;
             row
         };
-        let slides = system.machine.friction.iter().map(slide).collect();
-        (system.z, system.w, system.slides) = (z, w, slides);
+        let slides: Vec<Functional> = system.machine.friction.iter().map(slide).collect();
+        let friction = system.machine.friction.iter().zip(&slides).map(|(friction, row)| Curve {
+            points: [[0.0, friction.force]].iter().chain(&friction.at_speed).copied().collect(),
+            slopes: [0.0; 2],
+            argument: row.clone(),
+            wall: None,
+            least: 1,
+        });
+        let springs = system.machine.springs.iter().map(|NonlinearSpring { row, points, wall }| {
+            let slope = |[a, b]: [usize; 2]| (points[b][1] - points[a][1]) / (points[b][0] - points[a][0]);
+            let slopes = [[0, 1], [points.len() - 2, points.len() - 1]].map(slope);
+            let (argument, least) = (system.row(row, 0), usize::from(wall.is_some()));
+            Curve { points: points.clone(), slopes, argument, wall: *wall, least }
+        });
+        let curves = friction.chain(springs).collect();
+        (system.z, system.w, system.slides, system.curves) = (z, w, slides, curves);
         let as_row = |row: &Vector| Matrix::from_rows(&[row.transpose()]);
         let stages = || system.machine.stages.iter();
         let mut held: Vec<Matrix> = stages().map(|forces| forces.stiffness.clone()).collect();
         held.extend(system.machine.gaps.iter().map(|gap| as_row(&gap.row)));
+        held.extend(system.machine.springs.iter().map(|spring| as_row(&spring.row)));
         let mut damped = held.clone();
         damped.extend(stages().flat_map(|forces| [forces.damping.clone(), forces.damping.transpose()]));
         damped.extend(system.machine.friction.iter().map(|friction| as_row(&friction.row)));
@@ -213,18 +272,33 @@ impl System {
         row
     }
 
-    /// Returns the row of the force, positive away from the wall, of spring, damper and preload behind a wall that only pushes. There
-    /// is none if this force cannot pull behind the wall.
-    pub(crate) fn pushing(&self, gap: usize, side: Side, nth: usize, stage: usize) -> Option<Functional> {
+    /// Returns the row of the force, positive away from the wall, of spring, damper, preload and curve behind a wall that only pushes.
+    /// There is none if this force cannot pull behind the wall.
+    pub(crate) fn pushing(
+        &self,
+        gap: usize,
+        side: Side,
+        nth: usize,
+        stage: usize,
+        passed: &[usize],
+    ) -> Option<Functional> {
         let wall = &self.machine.gaps[gap].walls[side.index()][nth];
         let spring = &wall.springs[stage];
-        let may_pull = spring.damping != 0.0 || spring.preload != 0.0;
+        let curve = self.curves.iter().zip(passed).find(|(curve, _)| curve.wall == Some((gap, side)));
+        let may_pull = spring.damping != 0.0
+            || spring.preload != 0.0
+            || curve.is_some_and(|(curve, _)| curve.may_pull());
         if wall.contact != Contact::Pushing || !may_pull {
             return None;
         }
         let s = side.sign();
         let mut row = (&self.z[gap] * spring.stiffness + &self.w[gap] * spring.damping) * s;
         row[2 * self.degrees] = spring.preload - s * spring.stiffness * wall.at;
+        if let Some((curve, &passed)) = curve {
+            let [slope, force] = curve.line(passed);
+            row += &curve.argument * slope;
+            row[2 * self.degrees] += force;
+        }
         Some(row)
     }
 
@@ -270,8 +344,22 @@ impl System {
                 load += &gap.row * (spring.stiffness * wall.at - side.sign() * spring.preload);
             }
         }
-        for (friction, grip) in machine.friction.iter().zip(&key.grips) {
-            load -= &friction.row * (friction.force * grip.sign());
+        for (i, (friction, grip)) in machine.friction.iter().zip(&key.grips).enumerate() {
+            // While sliding, the force has the sign of the rate, and the slope acts on the rate itself.
+            let [slope, force] = self.curves[i].line(key.passed[i]).map(|x| x * grip.sign());
+            load -= &friction.row * (force - grip.sign() * slope * friction.speed);
+            damping += &friction.row * friction.row.transpose() * (grip.sign() * slope);
+        }
+        let curves = self.curves.iter().zip(&key.passed).skip(machine.friction.len());
+        for ((curve, &passed), spring) in curves.zip(&machine.springs) {
+            let acts = curve.wall.is_none_or(|(gap, side)| {
+                f64::from(key.acting[gap]) * side.sign() == machine.gaps[gap].walls[side.index()].len() as f64
+            });
+            if acts {
+                let [slope, force] = curve.line(passed);
+                load -= &spring.row * force;
+                stiffness += &spring.row * spring.row.transpose() * slope;
+            }
         }
         let mut a = Matrix::zeros(self.size(), self.size());
         a.view_mut((0, n), (n, n)).fill_with_identity();
