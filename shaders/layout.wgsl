@@ -134,8 +134,8 @@ struct TallyNow {
     next_change: u32,
     // 1 if the lane is at a stop phase and has not been observed there.
     at_stop: u32,
-    // The present interval between walls (pair/intervals.wgsl). Machines: 1 once two gaps have reached their walls at the same time.
-    interval: u32,
+    // Machines: 1 once two gaps have reached their walls at the same time.
+    ties: u32,
 }
 
 // Search for a cycle, updated at strobes.
@@ -167,10 +167,9 @@ struct Search {
     newton_steps: u32,
     branch: u32,
     branch_period: u32,
-    // MODE_*, SIDE_* and interval of the motion where Newton's method started.
+    // MODE_* and SIDE_* of the motion where Newton's method started.
     newton_start_mode: u32,
     newton_start_origin: u32,
-    newton_start_interval: u32,
     // Divisor of the cycle's period after which the motion came nearest to its start, and that distance in quarter
     // octaves below 1.
     divisor: u32,

@@ -92,7 +92,7 @@ impl Chain {
             contact: Contact::Impact,
             restitution: Restitution::Constant(restitution),
             mesh_speed: 0.01,
-            springs: vec![Spring { stiffness: 100.0, damping: 1.0, preload: 0.0 }; self.stages],
+            springs: vec![Spring { stiffness: 100.0, damping: 1.0, preload: None }; self.stages],
         };
         let gap = |i: usize| GapRow {
             row: DVector::from_fn(n, |j, _| f64::from(u8::from(j == i)) - f64::from(u8::from(j == i + 1))),

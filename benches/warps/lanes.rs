@@ -24,7 +24,6 @@ fn keys(@builtin(global_invocation_id) id: vec3<u32>) {
 ";
 
 // As in src/gpu/layout.rs, src/gpu/pair/constants.rs and src/gpu/averaging.rs.
-const NO_FLOW: u32 = u32::MAX;
 const PAIRS_PER_HARMONIC: usize = 21;
 const EXPONENT_BLOCKS: u32 = 32;
 
@@ -68,7 +67,7 @@ fn main() -> anyhow::Result<()> {
             place
         });
         let Constants { steps, degrees, .. } = constants;
-        shapes.push(FlowShape { steps, phasors, degrees, behind: [NO_FLOW; 2], ..FlowShape::default() });
+        shapes.push(FlowShape { steps, phasors, degrees, ..FlowShape::default() });
         flows.push(pair.flow);
     }
     pairs.push([1.0, 0.0]);

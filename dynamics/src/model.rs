@@ -28,7 +28,7 @@ pub use oscillator::{
 };
 pub(crate) use oscillator::{LEAST_LENGTH, ON_WALL};
 pub(crate) use pair::is_semidefinite;
-pub use pair::{Domain, Form, Harmonic, OuterWall, Pair, Stage};
+pub use pair::{Domain, Form, Harmonic, Pair, Stage};
 pub use parameter::{Parameter, ParameterError, Range, Shapes, Units};
 pub use rigid_modes::{RigidMode, RigidModes};
 pub use schedule::{MOST_CHANGES, MOST_STAGES};

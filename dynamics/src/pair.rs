@@ -16,7 +16,6 @@ mod elastic;
 pub mod flow;
 mod localisation;
 mod meter;
-mod pushing;
 mod short_flight;
 mod stages;
 mod start;
@@ -52,8 +51,6 @@ enum Mode {
     Onset(Side),
     /// Sustained contact: meshing with the gap behind the wall; also motion behind an elastic wall.
     Sustained(Side),
-    /// Open contact behind a wall that only pushes.
-    Open(Side),
     /// At rest on a rigid wall and pressed against it.
     Stuck(Side),
 }
@@ -62,7 +59,7 @@ impl Mode {
     #[inline]
     fn domain(self) -> DomainKind {
         match self {
-            Mode::Free | Mode::Open(_) => DomainKind::Free,
+            Mode::Free => DomainKind::Free,
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => DomainKind::Meshing(side),
         }
     }
@@ -70,7 +67,6 @@ impl Mode {
     fn mirrored(self) -> Mode {
         match self {
             Mode::Free => Mode::Free,
-            Mode::Open(side) => Mode::Open(side.mirrored()),
             Mode::Onset(side) => Mode::Onset(side.mirrored()),
             Mode::Sustained(side) => Mode::Sustained(side.mirrored()),
             Mode::Stuck(side) => Mode::Stuck(side.mirrored()),
@@ -78,20 +74,11 @@ impl Mode {
     }
 }
 
-/// Returns the side of an interval behind a wall.
-pub(crate) fn side_of(interval: i32) -> Side {
-    if interval > 0 { Side::Right } else { Side::Left }
-}
-
 /// The motion of one pair, with `N` tangent vectors: 0, 1 for a Lyapunov exponent, or 4 for a monodromy matrix.
 #[derive(Clone, Debug)]
 pub(crate) struct PairMotion<'f, const N: usize = 0> {
-    /// The flow of the present stage and interval.
+    /// The flow of the present stage.
     flow: &'f PairFlow,
-    /// The flow of the present stage, in all intervals.
-    stage: &'f PairFlow,
-    /// The present interval between walls, [`PairFlow::interval`].
-    interval: i32,
     schedule: Schedule<'f>,
     law: Law,
     mode: Mode,
@@ -99,8 +86,6 @@ pub(crate) struct PairMotion<'f, const N: usize = 0> {
     origin: Option<Side>,
     /// If the gap is just leaving a wall: the wall, and the order of the root of the distance at this instant.
     from_wall: Option<(Side, usize)>,
-    /// Order of the root of the pushing wall's force at this instant; 0 if the force is not 0.
-    from_force: usize,
     /// Whether the flight that begins here may be a short flight.
     short_flight: bool,
     /// A contact that must be processed first: the motion starts on this wall.
@@ -132,11 +117,8 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     pub(crate) fn perturb(&mut self, mut share: impl FnMut() -> f64) {
         let shares: [f64; 4] = std::array::from_fn(|_| share());
         let wall = match self.mode {
-            Mode::Free if self.interval == 0 => 0.0,
-            Mode::Free => self.flow.wall(side_of(self.interval).mirrored()),
-            Mode::Onset(side) | Mode::Sustained(side) | Mode::Open(side) | Mode::Stuck(side) => {
-                self.flow.wall(side)
-            }
+            Mode::Free => 0.0,
+            Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => self.flow.wall(side),
         };
         if self.from_wall.is_none() {
             self.q[0] += shares[0] * (self.q[0] - wall);
@@ -169,22 +151,17 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     /// Returns the wall of the lasting contact, if there is one.
     pub(crate) fn meshing(&self) -> Option<Side> {
         match self.mode {
-            Mode::Free | Mode::Open(_) => (self.interval != 0).then(|| side_of(self.interval)),
+            Mode::Free => None,
             Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side) => Some(side),
         }
     }
 
-    /// Returns the present interval between walls, [`PairFlow::interval`].
-    pub(crate) fn interval(&self) -> i32 {
-        self.interval
-    }
-
-    /// Returns the present domain of the interval.
+    /// Returns the present domain.
     pub(crate) fn domain(&self) -> DomainKind {
         self.mode.domain()
     }
 
-    /// Whether the gap in free motion passed a wall of its interval less than `time` ago, or will reach one within `time`.
+    /// Whether the gap in free motion passed a wall less than `time` ago, or will reach one within `time`.
     pub(crate) fn passes_wall(&self, time: f64) -> bool {
         // The gap is computed from the state, as at the start of a trajectory.
         let q = self.flow.to_gap(self.state());
@@ -244,7 +221,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         self.advance_to(period, observer)?;
         self.phasor = [1.0, 0.0];
         let first = self.schedule.restart();
-        if !std::ptr::eq(self.stage, first) {
+        if !std::ptr::eq(self.flow, first) {
             // A contact that this change ends belongs to the period before phase 0.
             self.enter_stage(first, observer);
         }
@@ -327,7 +304,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     /// Fails if the bound on a step overflows, as it does for extreme rates.
     fn check_bounds(&self, linear: &LinearFlow) -> Result<(), Stop> {
         let bound = match self.mode {
-            Mode::Free | Mode::Sustained(_) | Mode::Open(_) => &linear.gap_bound,
+            Mode::Free | Mode::Sustained(_) => &linear.gap_bound,
             Mode::Onset(_) | Mode::Stuck(_) => &linear.pressing_bound,
         };
         let finite = bound.remainder(&self.q, &self.phasor, 1.0).is_finite();
@@ -435,7 +412,6 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     #[inline(always)]
     fn depart(&mut self) {
         self.from_wall = None;
-        self.from_force = 0;
     }
 
     /// Advances the motion to `until`, a time `s` away, within a clear step.
@@ -468,7 +444,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
 
     #[inline(always)]
     fn count_meshing(&mut self, s: f64) {
-        if self.mode.domain() != DomainKind::Free || self.interval != 0 {
+        if self.mode.domain() != DomainKind::Free {
             self.meshing_time += s;
         }
     }

@@ -164,7 +164,7 @@ fn contact_free_growth() -> Real {
 
 // Whether two gaps have reached their walls at the same time, so that their order in the model decided the motion.
 fn is_tied() -> bool {
-    return tally.interval == 1u;
+    return tally.ties == 1u;
 }
 
 // Whether the motion is away from all walls, and no force or rate is at its limit.

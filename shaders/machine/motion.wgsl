@@ -804,7 +804,7 @@ fn impact(gap: u32, side: u32) {
     }
     held_gaps = select(UNSURE, held_gaps, kept == 0u);
     if is_tied_with_another(gap) {
-        tally.interval = 1u;
+        tally.ties = 1u;
     }
     if !lasts && !(pressing > 0.0) && approach < GRAZING_SPEED * flow.speed {
         tally.grazes += 1u;

@@ -74,7 +74,6 @@ fn close_chatter(side: u32, u: Real) {
     }
     motion.q = ends;
     advance_phase(lasts);
-    count_short_contact(lasts);
     turn_phasor(lasts);
     sync_overtones(tally.step, motion.theta);
     count_event(side);
@@ -141,7 +140,6 @@ fn follow_chatter(side: u32) {
         elapsed += t;
         motion.q = array<Real, 4>(walls[side], -sign * leaving, end.x, end.x_rate + kick * removed);
         advance_phase(t);
-        count_short_contact(t);
         motion.phasor = begun;
         turn_phasor(elapsed);
         sync_overtones(tally.step, motion.theta);

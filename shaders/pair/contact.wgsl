@@ -189,11 +189,7 @@ fn count_event(side: u32) {
     add_symbol_of_flight(side);
     keep_strobe_distance();
     // Meshing may also end before the gap reaches its wall. Such motion lies on another branch of the strobe map, because its modes differ.
-    var code = 2u * tally.mode + side + 1u;
-    if INTERVALS {
-        code += 16u * tally.interval;
-    }
-    tally.itinerary = mix_bits(tally.itinerary + code);
+    tally.itinerary = mix_bits(tally.itinerary + (2u * tally.mode + side + 1u));
     tally.origin = side;
     tally.events += 1u;
     tally.events_in_period += 1u;

@@ -16,16 +16,8 @@ fn enter_elastic(side: u32) -> Jump {
     var jump = Jump(false, MODE_FREE, ALONG_GAP, motion.q[1], 1.0, 0.0, 0.0);
     let is_pressed = closing == 0.0 && presses(present_pull(), side, motion.q);
     if closing > 0.0 || is_pressed {
-        // A gap that returns to the wall from open contact has no contact to end.
-        jump.event = !is_open();
+        jump.event = true;
         pass_damper(side, 1.0);
-        if has_preload(side) && closing < GRAZING_SPEED * speed {
-            tally.grazes += 1u;
-        }
-        if INTERVALS && flow_behind(side) != NO_FLOW {
-            jump.mode = MODE_PASSING;
-            return jump;
-        }
         jump.mode = MODE_SUSTAINED + side;
         motion.q[0] = 0.0;
     }
@@ -48,11 +40,5 @@ fn pass_damper(side: u32, way: Real) {
         let damper = flows[cell.flow_index].damper[side];
         crossing.is_smooth = true;
         crossing.jolt = array<Real, 2>(way * damper[0], way * damper[1]);
-        if has_preload(side) && abs(motion.q[1]) >= NO_SPEED * speed {
-            // The preload makes the force jump, so the rate does not cancel.
-            let preload = flows[cell.flow_index].preload[side];
-            let per_rate = way / motion.q[1];
-            crossing.jolt = array<Real, 2>(crossing.jolt[0] + per_rate * preload[0], crossing.jolt[1] + per_rate * preload[1]);
-        }
     }
 }

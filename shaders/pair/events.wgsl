@@ -51,29 +51,18 @@ fn judge(c: array<Real, 7>, order: u32, eps: Real) -> u32 {
 var<private> offsets: vec2<Real>;
 var<private> slopes: vec2<Real>;
 
-// Whether a distance is the force of a wall that only pushes.
-fn is_force(second: bool) -> bool {
-    return tally.mode == MODE_FREE && is_bounded_by_force(select(SIDE_RIGHT, SIDE_LEFT, second));
-}
-
 // Returns a distance at `tau` with slope and curvature. `z` is the displacement of the gap with slope and curvature.
 fn event_distance(second: bool, z: vec3<Real>, tau: Real) -> vec3<Real> {
     if second && is_onset() {
         return sign_of(side_of(tally.mode)) * pressing_jet(tau);
     }
     let offset = select(offsets.x, offsets.y, second);
-    if is_force(second) {
-        return force_jet(offset, z, tau);
-    }
     let slope = select(slopes.x, slopes.y, second);
     return vec3<Real>(offset + slope * z.x, slope * z.y, slope * z.z);
 }
 
 // Returns a bound on the remainder of a distance's middle coefficient. `rest` is the sixth power of the time, divided by 14,400.
 fn remainder(second: bool, growth: Real, rest: Real) -> Real {
-    if is_force(second) {
-        return force_bound(motion.bound + growth, rate_bound + growth) * rest + 8.0 * ULP * size_of_force(motion.q);
-    }
     // The pressing acceleration has derivatives of two more orders.
     return (select(motion.bound, pressing_bound, second) + growth) * rest + 8.0 * ULP * abs(select(offsets.x, offsets.y, second));
 }
@@ -84,12 +73,6 @@ fn set_offsets() {
     if tally.mode == MODE_FREE {
         offsets = vec2<Real>(walls[0] - z, z - walls[1]);
         slopes = vec2<Real>(-1.0, 1.0);
-        if watches_force() {
-            // A flight that begins where the force is 0 has a root at its start.
-            let begins = tally.order > 0u && tally.origin == side_of_interval();
-            let start = select(force_inside(motion.q), Real(0.0), begins);
-            offsets = select(vec2<Real>(offsets.x, start), vec2<Real>(start, offsets.y), side_of_interval() == SIDE_RIGHT);
-        }
     } else if sticks() {
         offsets = vec2<Real>(sign * gap_terms[0], HUGE);
         slopes = vec2<Real>(sign, 0.0);
@@ -190,7 +173,7 @@ fn begins_second() -> bool {
 // `begun_order` at the start.
 fn first_event(len: Real, growth: Real, begun: bool, begun_order: u32) -> Find {
     // In free motion the sum of both distances is constant. In contact the second one is HUGE, and so is the sum.
-    let is_mirrored = !(is_onset() || watches_force());
+    let is_mirrored = !is_onset();
     let reach = offsets.x + offsets.y;
     let start = vec3<Real>(0.0, gap_terms[1], 2.0 * gap_terms[2]);
     var order = begun_order;
@@ -284,7 +267,7 @@ fn first_event(len: Real, growth: Real, begun: bool, begun_order: u32) -> Find {
         }
         // The shortest part is still unclear, so the gap touches the wall within rounding. At elastic walls this has no effect.
         let touched = select(side_of(tally.mode), select(SIDE_RIGHT, SIDE_LEFT, begun != is_other), tally.mode == MODE_FREE);
-        if !is_elastic(touched) || has_preload(touched) {
+        if !is_elastic(touched) {
             tally.grazes += 1u;
         }
         if right.x <= 0.0 {
@@ -309,9 +292,6 @@ var<private> balanced: Real;
 
 // Bound on the eighth derivative of the gap, which the contact onset needs.
 var<private> pressing_bound: Real;
-
-// Bound on the seventh derivative of the gap, which the force of a wall that only pushes needs.
-var<private> rate_bound: Real;
 
 // Largest number of bisections for the time at which the contact onset is deepest.
 const DEEPEST_CAP: u32 = 30u;
@@ -360,10 +340,6 @@ fn careful() -> bool {
     }
     set_offsets();
     pressing_bound = motion.bound;
-    if watches_force() {
-        rate_bound =
-            derivative_bound(720.0 * gap_terms[6], 5040.0 * gap_terms[7], 720.0 * x_terms[6], 5040.0 * x_terms[7]);
-    }
     if sticks() {
         motion.bound = stuck_bound();
     }
@@ -405,7 +381,7 @@ fn careful() -> bool {
         motion.q[1] = 0.0;
     }
     tally.order = 0u;
-    if MESH && (d > 0u || is_behind_wall()) {
+    if MESH && d > 0u {
         count_meshing(found.tau * share);
     }
     advance_phase(found.tau * share);
@@ -437,24 +413,18 @@ fn act(second: bool, tau: Real) {
     let settling = tau == 0.0;
     let mode = tally.mode;
     var side = side_of(mode);
-    var is_force = false;
     var jump: Jump;
     crossing = Crossing();
     if mode == MODE_FREE {
         side = select(SIDE_RIGHT, SIDE_LEFT, second);
-        is_force = is_bounded_by_force(side);
-        if !is_force {
-            motion.q[0] = walls[side];
-        }
+        motion.q[0] = walls[side];
     } else if !second {
         motion.q[0] = 0.0;
     }
     if VECTORS > 0u {
         crossing.before = field();
     }
-    if is_force {
-        jump = change_force();
-    } else if mode == MODE_FREE {
+    if mode == MODE_FREE {
         jump = contact(side, settling);
     } else if sticks() {
         jump = let_go(side);
@@ -476,15 +446,7 @@ fn act(second: bool, tau: Real) {
     if sticks() {
         tally.order = 3u;
     }
-    if INTERVALS && jump.mode == MODE_PASSING {
-        pass_wall(side);
-        if is_force {
-            tally.order = 1u;
-        } else if PUSHING && motion.q[1] == 0.0 && has_preload(1u - side) && !presses(present_pull(), side, motion.q) {
-            // A load below the preload holds the gap on the wall by an infinite series of contacts.
-            tally.status = STATUS_CAP_EVENTS;
-        }
-    } else if jump.mode != mode {
+    if jump.mode != mode {
         tally.mode = jump.mode;
         enter(domain_of(jump.mode));
     }

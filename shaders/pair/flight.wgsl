@@ -28,9 +28,8 @@ fn steps_before(step: u32, theta: Real) -> u32 {
 }
 
 fn scan() -> u32 {
-    // Every step is a careful one from rest on a wall, in the contact onset, behind a wall that only pushes, and while the motion is
-    // measured.
-    if MEASURE || tally.order > 1u || tally.mode >= MODE_ONSET || watches_force() {
+    // Every step is a careful one from rest on a wall, in the contact onset, and while the motion is measured.
+    if MEASURE || tally.order > 1u || tally.mode >= MODE_ONSET {
         return SCAN_CAREFUL;
     }
     let d = domain_of(tally.mode);
@@ -159,14 +158,6 @@ fn scan() -> u32 {
     if MESH {
         tally.mesh_right += select(0u, count, d == 1u);
         tally.mesh_left += select(0u, count, d == 2u);
-        tally.mesh_whole += select(0u, count, d == 0u && is_behind_wall());
     }
     return select(SCAN_CAREFUL, SCAN_BUDGET, is_interrupted);
-}
-
-// Counts a short flight from the last of several walls as contact, because the springs in front of that wall still press.
-fn count_short_contact(part: Real) {
-    if MESH && is_behind_wall() {
-        count_meshing(part);
-    }
 }

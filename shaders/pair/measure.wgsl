@@ -10,8 +10,7 @@ const NODES: u32 = 6u;
 const EXTREME_ITERATIONS: u32 = 6u;
 
 // Places in `sums`. Integrals: gap and x; squares of both displacements and of the gap; gap and x times the phasor; power of the dampers;
-// square of the contact force; contact time. Sums over events: approach speeds, lost energy, energy released by walls that only push,
-// number of contacts. Last: number of measured periods.
+// square of the contact force; contact time. Sums over events: approach speeds, lost energy, number of contacts. Last: number of measured periods.
 const SUM_Z: u32 = 0u;
 const SUM_X: u32 = 1u;
 const SUM_SQUARES: u32 = 2u;
@@ -24,9 +23,8 @@ const SUM_FORCE: u32 = 10u;
 const SUM_CONTACT: u32 = 11u;
 const SUM_APPROACH: u32 = 12u;
 const SUM_LOST: u32 = 13u;
-const SUM_RELEASED: u32 = 14u;
-const SUM_COUNT: u32 = 15u;
-const SUM_PERIODS: u32 = 16u;
+const SUM_COUNT: u32 = 14u;
+const SUM_PERIODS: u32 = 15u;
 // Places in `highs` and `lows`: both displacements, the gap, the contact force; and the largest approach speed.
 const FORCE: u32 = 3u;
 const APPROACH: u32 = 4u;
@@ -74,11 +72,6 @@ fn add(place: u32, value: Real) {
 
 // Whether a wall with a spring is in contact.
 fn is_compliant() -> bool {
-    return touches_spring() || is_behind_wall();
-}
-
-// Whether the wall of the present domain has a spring.
-fn touches_spring() -> bool {
     return tally.mode != MODE_FREE && !sticks();
 }
 
@@ -92,20 +85,11 @@ fn measured_state(tau: Real) -> array<Real, 4> {
     return q;
 }
 
-// Returns the force of the contacts with springs, positive if they press. `q` is in the coordinates of the present domain.
+// Returns the force of the wall's spring and damper, positive if it presses. `q` is in the coordinates of the present domain.
 fn contact_force(q: array<Real, 4>) -> Real {
-    var side = side_of(tally.mode);
-    var force: Real = 0.0;
-    if touches_spring() {
-        let wall = flows[cell.flow_index].springs[side];
-        force = wall[0] * q[0] + wall[1] * q[1];
-    }
-    if is_behind_wall() {
-        side = side_of_interval();
-        let held = flows[cell.flow_index].held;
-        force += (held[0] * displaced(q)[2] + held[1] * q[1]) + held[2];
-    }
-    return sign_of(side) * force;
+    let side = side_of(tally.mode);
+    let wall = flows[cell.flow_index].springs[side];
+    return sign_of(side) * (wall[0] * q[0] + wall[1] * q[1]);
 }
 
 fn include_one(place: u32, value: Real) {
@@ -141,14 +125,8 @@ fn measured_rates(tau: Real) -> array<Real, 4> {
     var force: Real = 0.0;
     if is_compliant() {
         let acceleration = here.substeps * here.substeps * gap_jet(tau).z;
-        if touches_spring() {
-            let wall = flows[cell.flow_index].springs[side_of(tally.mode)];
-            force = wall[0] * q[1] + wall[1] * acceleration;
-        }
-        if is_behind_wall() {
-            let held = flows[cell.flow_index].held;
-            force += held[0] * q[1] + held[1] * acceleration;
-        }
+        let wall = flows[cell.flow_index].springs[side_of(tally.mode)];
+        force = wall[0] * q[1] + wall[1] * acceleration;
     }
     return array<Real, 4>(rows[0][0] * q[1] + rows[0][1] * q[3], rows[1][0] * q[1] + rows[1][1] * q[3], q[1], force);
 }

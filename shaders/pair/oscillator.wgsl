@@ -2,7 +2,7 @@
 
 // Loads constants at the start of a dispatch.
 fn resume_motion() {
-    if STAGES || INTERVALS {
+    if STAGES {
         cell.flow_index = present_flow();
     }
     fetch_constants();
@@ -137,17 +137,11 @@ fn place(to: State) {
 fn keep_modes() {
     search.newton_start_mode = tally.mode;
     search.newton_start_origin = tally.origin;
-    search.newton_start_interval = tally.interval;
 }
 
 fn restore_modes() {
     tally.mode = search.newton_start_mode;
     tally.origin = search.newton_start_origin;
-    if INTERVALS && tally.interval != search.newton_start_interval {
-        tally.interval = search.newton_start_interval;
-        cell.flow_index = present_flow();
-        fetch_constants();
-    }
 }
 
 // Error of a computed fixed point before amplification, in units of the motion's rounding error.
@@ -165,13 +159,8 @@ fn is_free() -> bool {
     return tally.mode == MODE_FREE && tally.order == 0u;
 }
 
-// Loads the state of the motion that results need.
-fn conclude_motion() {
-    if INTERVALS {
-        // Walls are the same in all stages.
-        cell.flow_index = flow_of_interval(cell.flow_index);
-    }
-}
+// Loads the state of the motion that results need. Walls are the same in all stages.
+fn conclude_motion() {}
 
 fn mesh_fraction(periods: u32) -> Real {
     let f = cell.flow_index;
@@ -194,22 +183,8 @@ fn begin_motion() {
     }
 }
 
-// A start beyond the last wall of a side is a sustained contact.
+// A start beyond a wall is a sustained contact.
 fn start_beyond(side: u32) {
-    if INTERVALS {
-        while sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) > 0.0 && shapes[cell.flow_index].behind[side] != NO_FLOW {
-            cell.flow_index = shapes[cell.flow_index].behind[side];
-            tally.interval = max(tally.interval, side) + 2u;
-        }
-        if watches_force() && force_inside(motion.q) < 0.0 {
-            cell.flow_index = shapes[cell.flow_index].behind[side];
-            tally.interval += OPEN - 2u;
-            tally.origin = side;
-        }
-        if sign_of(side) * (motion.q[0] - flows[cell.flow_index].walls[side]) <= 0.0 {
-            return;
-        }
-    }
     motion.q[0] -= flows[cell.flow_index].walls[side];
     tally.mode = MODE_SUSTAINED + side;
     tally.origin = side;
@@ -220,8 +195,6 @@ fn add_symbol_of_flight(side: u32) {
     var symbol: u32;
     if tally.mode != MODE_FREE {
         symbol = select(4u, 1u, side == SIDE_RIGHT);
-    } else if is_behind_wall() {
-        symbol = select(4u, 1u, side_of_interval() == SIDE_RIGHT);
     } else if tally.origin == SIDE_RIGHT {
         symbol = select(3u, 2u, side == SIDE_RIGHT);
     } else if tally.origin == SIDE_LEFT {

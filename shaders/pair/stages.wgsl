@@ -9,8 +9,9 @@ const NO_STEP: u32 = 0xffffffffu;
 var<private> change_step: u32;
 var<private> change_theta: Real;
 
-// Returns the flow of the present stage between the first walls. `flow` is that of the first stage.
-fn flow_of_stage(flow: u32) -> u32 {
+// Returns the flow of the present stage.
+fn present_flow() -> u32 {
+    let flow = cells[lane].flow_index;
     let count = shapes[flow].changes;
     if count == 0u {
         return flow;
@@ -63,11 +64,10 @@ fn restart_schedule() {
 }
 
 // Enters a stage. State and tangent vectors are continuous. Contacts that depend on a force are decided again: a gap at rest on a rigid
-// wall, a contact onset, and contact with a wall that only pushes.
+// wall, and a contact onset.
 fn enter_stage() {
     let side = side_of(tally.mode);
     let spring = flows[cell.flow_index].springs[side][0];
-    let push = flows[cell.flow_index].push;
     cell.flow_index = present_flow();
     fetch_constants();
     if sticks() {
@@ -82,7 +82,6 @@ fn enter_stage() {
         }
         leave_contact(side);
     }
-    settle_force(push);
     if sticks() {
         tally.order = stuck_order(side);
     } else if tally.order > 0u {

@@ -1,8 +1,7 @@
 //! Features of oscillators whose shader code is compiled only if it is needed.
 
 use super::machine::{MODES, MOST_DOMAINS, MOST_GAPS, MachineShape, domain_count};
-use super::pair::has_negative_preload;
-use rattlemap_dynamics::model::{Contact, DryFriction, Form, Pair, Side, Timing};
+use rattlemap_dynamics::model::{Contact, DryFriction, Form, Pair, Timing};
 
 /// The features of one or more oscillators, or the features that a shader supports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -15,12 +14,6 @@ pub struct Features {
     pub harmonics: u32,
     /// Stages: domains that change within a forcing period.
     pub stages: bool,
-    /// Several walls on one side.
-    pub intervals: bool,
-    /// Walls that only push, or that have a preload.
-    pub pushing: bool,
-    /// Walls that only push and have a negative preload. No shader supports them.
-    pub negative_preload: bool,
     /// Sizes of a machine.
     pub machine: Option<MachineShape>,
     /// Machines with more domains than a table can hold.
@@ -52,20 +45,12 @@ impl Features {
 
     fn of_pair(pair: &Pair) -> Features {
         let mut walls = pair.contacts.iter().zip(pair.walls);
-        let pushing = Side::BOTH.into_iter().any(|side| pair.is_pushing_or_preloaded(side));
         Features {
             kinds: walls.any(|(&contact, wall)| contact != Contact::Impact && wall.is_finite()),
             sine: pair.force_sin != [0.0; 2],
             harmonics: pair.harmonics.len() as u32,
             stages: !pair.schedule.is_empty(),
-            intervals: pair.has_outer_walls() || pushing,
-            pushing,
-            negative_preload: has_negative_preload(pair),
-            machine: None,
-            too_many_domains: false,
-            dependent_gaps: false,
-            unforced: false,
-            curves: false,
+            ..Features::default()
         }
     }
 
@@ -76,9 +61,6 @@ impl Features {
             sine: self.sine || other.sine,
             harmonics: self.harmonics.max(other.harmonics),
             stages: self.stages || other.stages,
-            intervals: self.intervals || other.intervals,
-            pushing: self.pushing || other.pushing,
-            negative_preload: self.negative_preload || other.negative_preload,
             machine: match (self.machine, other.machine) {
                 (Some(own), Some(others)) => Some(own.and(others)),
                 (own, others) => own.or(others),
@@ -105,8 +87,7 @@ impl Features {
         self.machine.map_or(4, |shape| shape.dim() + MODES)
     }
 
-    fn without_code(self) -> [(bool, &'static str, &'static str); 5] {
-        let preload = "a wall that only pushes and has a negative preload";
+    fn without_code(self) -> [(bool, &'static str, &'static str); 4] {
         [
             (
                 self.dependent_gaps,
@@ -114,7 +95,6 @@ impl Features {
                 "dependent_gaps",
             ),
             (self.too_many_domains, "more than 4096 combinations of modes", "too_many_domains"),
-            (self.negative_preload, preload, "negative_preload"),
             (self.unforced, "motion without force", "unforced"),
             (self.curves, "nonlinear springs, or friction that is not constant", "curves"),
         ]
@@ -127,8 +107,6 @@ impl Features {
             (self.sine && !code.sine, "a force with a sine", "sine"),
             (self.harmonics > code.harmonics, "more harmonics of the force", "harmonics"),
             (self.stages && !code.stages, "stages", "stages"),
-            (self.intervals && !code.intervals, "several walls on one side", "intervals"),
-            (self.pushing && !code.pushing, "a wall that only pushes or has a preload", "pushing"),
             (self.machine != code.machine, "a machine of other sizes", "machine"),
         ]
         .into_iter()

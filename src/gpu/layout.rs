@@ -190,7 +190,7 @@ structs! {
         unused: [f64; 2],
     }
 
-    /// Constants that lanes share if they differ only in the contact law. Each stage and each interval between walls has such a struct.
+    /// Constants that lanes share if they differ only in the contact law. Each stage has such a struct.
     Flow {
         // Free motion, meshing on the right, meshing on the left. Meshing domains measure the gap from their wall.
         domains: [Domain; 3],
@@ -223,16 +223,6 @@ structs! {
         springs: [[f64; 2]; 2],
         // Both displacements of the model as factors of gap and x.
         displacements: [[f64; 2]; 2],
-        // Contact force of the walls that the gap has passed, positive to the left: factors of gap, rate and 1, in the units of
-        // measure.wgsl.
-        held: [f64; 3],
-        // Force of a wall that only pushes, positive inside the interval that it bounds: factors of gap, rate and 1, in the units of
-        // measure.wgsl.
-        push: [f64; 3],
-        // Changes of the accelerations of gap and x by the preload of the right and of the left wall, where the motion enters the wall.
-        preload: [[f64; 2]; 2],
-        // Fills the struct to a multiple of four numbers.
-        unused: [f64; 2],
     }
 
     /// Whole numbers of a flow.
@@ -253,8 +243,6 @@ structs! {
         // Index in `pairs` of the changes of its stage (stages.wgsl), and their number; 0 if there are none.
         schedule: u32,
         changes: u32,
-        // Flows of the intervals behind the right and behind the left wall, or NO_FLOW (intervals.wgsl).
-        behind: [u32; 2],
     }
 
     /// Contact law of the right and of the left wall: restitution, and the largest leaving speed at which contact lasts under a pressing load.
@@ -322,7 +310,7 @@ impl Measured {
 const DIM: usize = STATE;
 
 /// Sums and extremes that a lane measures; `shaders/pair/measure.wgsl` has their places.
-pub(super) const SUMS: usize = 17;
+pub(super) const SUMS: usize = 16;
 pub(super) const EXTREMES: usize = 5;
 
 /// Numbers for a word and a pattern in a [`Finding`].
@@ -379,9 +367,6 @@ pub(super) fn symbols_per_number(bits: usize) -> usize {
     30 / bits
 }
 
-/// Stands for "no interval" where the index of a flow is expected.
-pub(super) const NO_FLOW: u32 = u32::MAX;
-
 /// Codes of the kinds of contact, with their names in the shader.
 pub(super) const CONTACTS: [(&str, u32); 3] = [("IMPACT", 0), ("RIGID", 1), ("ELASTIC", 2)];
 
@@ -391,7 +376,7 @@ pub(super) fn contact_code(contact: Contact) -> u32 {
     match contact {
         Contact::Impact => impact,
         Contact::Rigid => rigid,
-        // A wall that only pushes is described by further pages (pair/pushing.rs).
+        // No pair has a wall that only pushes.
         Contact::Elastic | Contact::Pushing => elastic,
     }
 }

@@ -370,7 +370,7 @@ impl MachineConstants {
                         table[at..at + 3].copy_from_slice(&[
                             spring.stiffness,
                             spring.damping,
-                            spring.preload,
+                            spring.force_at_wall(),
                         ]);
                     }
                 }

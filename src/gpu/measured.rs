@@ -12,7 +12,7 @@ type GapFactors = [f64; 2];
 /// Returns the quantities of a lane; none if it was not measured. `shaders/pair/measure.wgsl` has the places of the sums.
 pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quantities> {
     let (Measured { totals, highs, lows, .. }, _) = Measured::split(measured);
-    let [.., dissipated, force, contact, approach, lost, released, count, periods]: [f64; SUMS] = *totals;
+    let [.., dissipated, force, contact, approach, lost, count, periods]: [f64; SUMS] = *totals;
     if periods < 1.0 {
         return None;
     }
@@ -34,7 +34,7 @@ pub(super) fn quantities(constants: &Constants, measured: &[f64]) -> Option<Quan
         approaches: [Approaches::default(), Approaches::default(), both],
         // A sum of what impacts and springs lose is not negative, but for rounding.
         impact_energy: (lost * energy / (steps * h)).max(0.0),
-        release_energy: pair.has_pushing_walls.then_some(released * energy / (steps * h)),
+        release_energy: None,
         contact_force: (contact > 0.0)
             .then(|| [highs[3] * force_unit, (force / contact).max(0.0).sqrt() * force_unit]),
         displacements: std::array::from_fn(|i| if i < 3 { displacement(i) } else { Displacement::default() }),

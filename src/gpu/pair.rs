@@ -2,7 +2,5 @@
 
 pub(super) mod constants;
 mod coordinates;
-mod pushing;
 
-pub(super) use constants::{Change, PAIRS_PER_HARMONIC, Page, PairConstants, phasors, speed};
-pub(super) use pushing::has_negative_preload;
+pub(super) use constants::{Change, PAIRS_PER_HARMONIC, PairConstants, phasors, speed};

@@ -3,7 +3,7 @@
 use super::Measures;
 use super::features::Features;
 use super::layout::{
-    self, BLOCK, CONTACTS, EXTREMES, KEYS, LISTS, List, NO_FLOW, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH,
+    self, BLOCK, CONTACTS, EXTREMES, KEYS, LISTS, List, SPELLED_PATTERN, SPELLED_PATTERN_LENGTH,
     SPELLED_WORD, SPELLED_WORD_LENGTH, SPELLING, SUMS, symbols_per_number,
 };
 use super::pair::PAIRS_PER_HARMONIC;
@@ -87,8 +87,6 @@ const OSCILLATOR: &str = concat!(
     include_str!("../../shaders/pair/phase.wgsl"),
     include_str!("../../shaders/pair/harmonics.wgsl"),
     include_str!("../../shaders/pair/stages.wgsl"),
-    include_str!("../../shaders/pair/intervals.wgsl"),
-    include_str!("../../shaders/pair/pushing.wgsl"),
     include_str!("../../shaders/pair/contact.wgsl"),
     include_str!("../../shaders/pair/elastic.wgsl"),
     include_str!("../../shaders/pair/rigid.wgsl"),
@@ -199,7 +197,6 @@ impl Variant {
             ("SYMBOL_BITS", code.bits as u32),
             ("HASH_WINDOW", code.window as u32),
             ("PAIRS_PER_HARMONIC", PAIRS_PER_HARMONIC as u32),
-            ("NO_FLOW", NO_FLOW),
             ("WORD_SYMBOLS", code.most as u32),
             ("SYMBOLS_PER_NUMBER", symbols_per_number(code.bits) as u32),
         ]
@@ -221,8 +218,6 @@ impl Variant {
             ("KINDS", self.features.kinds),
             ("SINE", self.features.sine),
             ("STAGES", self.features.stages),
-            ("INTERVALS", self.features.intervals),
-            ("PUSHING", self.features.pushing),
             ("MEASURE", self.measures.is_some()),
             ("EXTREME", self.measures.is_some_and(|measures| measures.extremes)),
             ("MOMENTS", self.measures.is_some_and(|measures| measures.moments)),

@@ -8,14 +8,14 @@ use bytemuck::Zeroable;
 use super::constants::Constants;
 use super::features::Features;
 use super::guard::with_error_scopes;
-use super::layout::{self, Flow, FlowShape, NO_FLOW, contact_code};
+use super::layout::{self, Flow, FlowShape, contact_code};
 use super::machine::{self, MachineShape};
-use super::pair::{Change, PAIRS_PER_HARMONIC, Page, phasors as phasors_of};
+use super::pair::{Change, PAIRS_PER_HARMONIC, phasors as phasors_of};
 use super::precision::Precision;
 use super::shader::terms_of;
 use super::transfer::{buffer, reals, upload};
 use super::{Gpu, GpuError};
-use rattlemap_dynamics::model::{Form, Law, Side};
+use rattlemap_dynamics::model::{Form, Law};
 
 /// Flows and laws, uploaded once for any number of runs.
 pub struct Tables {
@@ -25,7 +25,7 @@ pub struct Tables {
     pub(super) is_even: Vec<bool>,
     /// The different sets of features of flows, each with the first flow that has it.
     pub(super) features: Vec<(usize, Features)>,
-    /// The first page of each flow, followed by the further pages of all flows.
+    /// The first stage of each flow, followed by the further stages of all flows.
     pub(super) flows: wgpu::Buffer,
     pub(super) shapes: wgpu::Buffer,
     /// Zeros for missing harmonics; phasors of the first harmonic; constants of the higher harmonics; changes of stages.
@@ -57,12 +57,10 @@ pub(crate) fn bytes(oscillator: impl Into<Form>, steps: Option<u32>) -> [u64; 2]
         }
     };
     let pair = size_of::<[f64; 2]>();
-    let page = size_of::<Constants>()
+    let stage = size_of::<Constants>()
         + size_of::<FlowShape>()
         + PAIRS_PER_HARMONIC * pair * oscillator.harmonics.len();
-    let pushing = Side::BOTH.into_iter().filter(|&side| oscillator.is_pushing_or_preloaded(side)).count();
-    let intervals = 1 + oscillator.outer_walls.iter().map(Vec::len).sum::<usize>() + 2 * pushing;
-    let flow = page * oscillator.stage_count() * intervals + 2 * pair * oscillator.schedule.len();
+    let flow = stage * oscillator.stage_count() + 2 * pair * oscillator.schedule.len();
     [flow as u64, phasors * pair as u64].map(|bytes| COPIES * bytes)
 }
 
@@ -108,7 +106,7 @@ impl Tables {
         }
         let flows = constants.len();
         let mut shapes = Vec::with_capacity(flows);
-        // Further pages follow those of all flows.
+        // Further stages follow the first ones of all flows.
         let mut further = Vec::new();
         let mut pairs = vec![[0.0; 2]; PAIRS_PER_HARMONIC];
         // Flows with equal steps share their phasors.
@@ -127,27 +125,26 @@ impl Tables {
             });
             let schedule = pairs.len() as u32;
             let first = flows + further.len() - 1;
-            let flow_of = |page: usize| if page == 0 { i as u32 } else { (first + page) as u32 };
-            let of_change = |change| pairs_of(change, flow_of(change.page), gpu.precision);
+            let flow_of = |stage: usize| if stage == 0 { i as u32 } else { (first + stage) as u32 };
+            let of_change = |change| pairs_of(change, flow_of(change.stage), gpu.precision);
             pairs.extend(pair.changes.iter().flat_map(of_change));
-            let mut shape = |page: &Page| {
+            let mut shape = |harmonics: &[[f64; 2]]| {
                 let place_of_harmonics = pairs.len() as u32;
-                pairs.extend(&page.harmonics);
+                pairs.extend(harmonics);
                 FlowShape {
                     steps: constants.steps,
                     phasors: place,
                     must_rest: pair.must_rest.into(),
                     degrees: constants.degrees,
-                    contacts: page.contacts.map(contact_code),
+                    contacts: pair.contacts.map(contact_code),
                     harmonics: place_of_harmonics,
-                    harmonic_count: (page.harmonics.len() / PAIRS_PER_HARMONIC) as u32,
+                    harmonic_count: (harmonics.len() / PAIRS_PER_HARMONIC) as u32,
                     schedule,
                     changes: pair.changes.len() as u32,
-                    behind: page.behind.map(|page| page.map_or(NO_FLOW, flow_of)),
                 }
             };
-            shapes.push(shape(&pair.page));
-            further.extend(pair.further.iter().map(|(flow, page)| (*flow, shape(page))));
+            shapes.push(shape(&pair.harmonics));
+            further.extend(pair.further.iter().map(|(flow, harmonics)| (*flow, shape(harmonics))));
             if features.iter().all(|(_, others)| *others != constants.features) {
                 features.push((i, constants.features));
             }
@@ -240,7 +237,7 @@ fn machine_shape(constants: &[Option<Constants>]) -> Option<MachineShape> {
     constants.iter().flatten().filter_map(|constants| constants.features.machine).reduce(MachineShape::and)
 }
 
-/// Rounds the constants of flows and uploads them; further pages follow all first pages. `size` is the size of a flow in the lanes'
+/// Rounds the constants of flows and uploads them; further stages follow all first stages. `size` is the size of a flow in the lanes'
 /// precision.
 fn upload_flows(
     gpu: &Gpu,

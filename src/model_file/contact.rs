@@ -69,7 +69,7 @@ pub struct WallSpring {
     /// Damping.
     pub damping: Staged,
     /// Force at the wall, positive away from it.
-    pub preload: Staged,
+    pub preload: Option<Staged>,
 }
 
 #[derive(Clone, Copy)]
@@ -103,7 +103,9 @@ impl Wall {
 
     /// Returns the entries that may change with time.
     pub(super) fn staged(&self) -> impl Iterator<Item = &Staged> {
-        self.spring.iter().flat_map(|spring| [&spring.stiffness, &spring.damping, &spring.preload])
+        self.spring
+            .iter()
+            .flat_map(|spring| [&spring.stiffness, &spring.damping].into_iter().chain(&spring.preload))
     }
 
     /// Returns the entries on which the contact law depends.
@@ -247,6 +249,8 @@ fn read_one<'a>(
     }
     let mut curve = None;
     let pulls = || section.get("pull").map_or(Ok(true), |field| field.flag());
+    // A spring alone never pulls.
+    let may_pull = damping.is_some() || preload.is_some();
     let law = match kind {
         LawKind::Impact => {
             for name in ["preload", "pull"] {
@@ -268,7 +272,7 @@ fn read_one<'a>(
                 }
             }
             section.require("stiffness", "an elastic wall needs the stiffness behind it")?;
-            WallLaw::Elastic { pulls: pulls()? }
+            WallLaw::Elastic { pulls: pulls()? || !may_pull }
         }
         LawKind::Curve => {
             curve = Some(ForceLaw::of_wall(section, names)?);
@@ -278,7 +282,7 @@ fn read_one<'a>(
     let spring = (stiffness.is_some() || damping.is_some() || curve.is_some()).then(|| WallSpring {
         stiffness: stiffness.unwrap_or_else(Entry::zero),
         damping: damping.unwrap_or_else(Entry::zero),
-        preload: preload.unwrap_or_else(Entry::zero),
+        preload,
     });
     Ok((which, side, Wall { at, law, spring, curve }))
 }

@@ -462,7 +462,7 @@ impl Values<'_> {
         Spring {
             stiffness: of(&spring.stiffness),
             damping: of(&spring.damping),
-            preload: of(&spring.preload),
+            preload: spring.preload.as_ref().map(of),
         }
     }
 

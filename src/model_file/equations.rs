@@ -116,7 +116,7 @@ pub(super) fn contacts(definition: &Definition, names: &[[String; 2]]) -> Vec<[S
                 let force = match &wall.spring {
                     None => format!("keeps {z} = {} while pressed", text(&wall.at)),
                     Some(spring) => {
-                        let preload = constant(&spring.preload);
+                        let preload = spring.preload.as_ref().and_then(constant);
                         let depth = minus(z, &wall.at);
                         let curve = wall.curve.as_ref().map(|law| {
                             let force = format!("({})", text(&law.force));

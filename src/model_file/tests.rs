@@ -114,12 +114,8 @@ fn all_fields_of_a_file_are_read() {
     assert_eq!(oscillator.force, [6.0, 0.0]);
     assert_eq!(oscillator.walls, [0.2, f64::NEG_INFINITY]);
     assert_eq!(oscillator.contacts[0], Contact::Rigid);
-    let free = Domain {
-        damping: [[0.5, 0.0], [0.0; 2]],
-        stiffness: [[1.0, 0.0], [0.0; 2]],
-        load: [-0.5, 0.0],
-        preload: 0.0,
-    };
+    let free =
+        Domain { damping: [[0.5, 0.0], [0.0; 2]], stiffness: [[1.0, 0.0], [0.0; 2]], load: [-0.5, 0.0] };
     assert_eq!(oscillator.free, free);
     assert_eq!(model.law(), Law { restitution: [0.8, 0.0], mesh_speed: [0.0; 2] });
     let mut other = model.clone();
@@ -252,13 +248,17 @@ fn a_side_may_have_several_walls() {
     let with = |walls: &[String]| format!("{motion}{}", walls.concat());
     let last = format!("[[contact]]\nside = 'right'{}", last.replace("at = \"d\"", "at = '3*d'"));
     let model = read(&with(&[wall("d", elastic), wall("2*d", elastic), last.clone()]));
-    let o = pair(&model);
-    assert_eq!((o.walls, o.contacts), ([0.25, -0.25], [Contact::Elastic; 2]));
-    let [right, left] = &o.outer_walls;
-    assert!(left.is_empty());
-    let found = right.iter().map(|wall| (wall.at, wall.contact, wall.meshing[0].stiffness[0][0]));
-    assert!(found.eq([(0.5, Contact::Elastic, 9.0), (0.75, Contact::Impact, 109.0)]), "{right:?}");
-    assert_eq!(right[0].meshing[0].load, [2.25, -4.5]);
+    let o = model.oscillator().unwrap();
+    assert_eq!(o.needs_machine(), Some("several walls on a side"));
+    let [right, left] = &o.gaps[0].walls;
+    let found = right.iter().chain(left).map(|wall| (wall.at, wall.contact, wall.springs[0].stiffness));
+    let expected = [
+        (0.25, Contact::Elastic, 3.0),
+        (0.5, Contact::Elastic, 3.0),
+        (0.75, Contact::Impact, 100.0),
+        (-0.25, Contact::Elastic, 30.0),
+    ];
+    assert_eq!(found.collect::<Vec<_>>(), expected);
     assert_eq!(model.law(), Law { restitution: [0.5, 0.0], mesh_speed: [0.05, 0.0] });
     let row = ["right 2", "2*d", "elastic", "", "", "k (z - d) + c w + k (z - 2*d) + c w"];
     assert_eq!(model.contacts()[1], row);
@@ -283,21 +283,19 @@ fn a_wall_may_only_push_and_have_a_preload() {
         wall("right", "pull = false\npreload = 'c'"),
         wall("left", "preload = 0.25").replace("'d'", "'-d'"),
     ]));
-    let o = pair(&model);
-    assert_eq!(o.contacts, [Contact::Pushing, Contact::Elastic]);
-    let [k, c, d] = ["k", "c", "d"]
-        .map(|name| model.value(model.parameters().iter().position(|p| p.name == name).unwrap()));
-    assert_eq!([o.meshing[0].preload, o.meshing[1].preload], [c, 0.25]);
-    // The spring adds k at g to the load, and the preload pushes away from the wall.
-    let added = |i: usize, j: usize| o.meshing[i].load[j] - o.free.load[j];
-    let pushes = [k * d - c, -k * d + 0.25];
-    for (i, push) in pushes.into_iter().enumerate() {
-        let off = (0..2).map(|j| (added(i, j) - push * o.gap[j]).abs()).fold(0.0, f64::max);
-        assert!(off < 1e-14, "{:?}", o.meshing[i]);
-    }
+    let o = model.oscillator().unwrap();
+    let found = o.gaps[0].walls.iter().flatten().map(|wall| (wall.contact, wall.springs[0].preload));
+    let c = o.gaps[0].walls[0][0].springs[0].damping;
+    assert!(found.eq([(Contact::Pushing, Some(c)), (Contact::Elastic, Some(0.25))]), "{o:?}");
     let right = ["right", "d", "elastic, only pushes", "", "", "max(0, k (z - d) + c w + c)"];
     let left = ["left", "-d", "elastic", "", "", "k (z + d) + c w - 0.25"];
     assert_eq!(model.contacts(), [right, left]);
+    let engine = |rest: &str| read(&with(&[wall("right", rest)])).oscillator().unwrap().needs_machine();
+    assert_eq!(engine("pull = false"), Some("walls that only push"));
+    assert_eq!(engine("preload = '0*c'"), Some("preloads"));
+    // A spring alone never pulls.
+    let spring = with(&[wall("right", "pull = false").replace("damping = 'c'\n", "")]);
+    assert_eq!(pair(&read(&spring)).contacts[0], Contact::Elastic);
     let refused = |walls: &[String], expected: &str| check_refusal(&with(walls), expected);
     refused(
         &[wall("right", "pull = false"), wall("right", "").replace("'d'", "'2*d'")],
@@ -527,7 +525,6 @@ fn stages_have_their_own_domains() {
         damping: [[damping, 0.0], [0.0, 1.0]],
         stiffness: [[stiffness, -1.0], [-1.0, 5.0]],
         load: [0.0, load],
-        preload: 0.0,
     };
     assert_eq!([oscillator.free, second.free], [domain(0.5, 4.0, 0.25), domain(1.0, 3.0, -0.25)]);
     // The spring adds k g g' to the stiffness and k at g to the load.
@@ -1010,14 +1007,14 @@ fn a_model_of_three_coordinates_and_two_gaps_is_a_machine() {
         contact: Contact::Elastic,
         restitution: Restitution::Constant(0.0),
         mesh_speed: 0.0,
-        springs: [3.0, 1.5].map(|stiffness| Spring { stiffness, damping: 0.0, preload: 0.125 }).into(),
+        springs: [3.0, 1.5].map(|stiffness| Spring { stiffness, damping: 0.0, preload: Some(0.125) }).into(),
     };
     let impact = model::Wall {
         at: 0.5,
         contact: Contact::Impact,
         restitution: Restitution::Constant(0.5),
         mesh_speed: 0.0,
-        springs: vec![Spring { stiffness: 0.0, damping: 0.5, preload: 0.0 }; 2],
+        springs: vec![Spring { stiffness: 0.0, damping: 0.5, preload: None }; 2],
     };
     let by_hand = Oscillator {
         omega: 1.5,

@@ -76,7 +76,7 @@ impl Linear {
     /// Returns the equation as the first displacement of a domain.
     pub(crate) fn domain(&self) -> Domain {
         let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
-        Domain { damping: first(self.c), stiffness: first(self.k), load: [self.load, 0.0], preload: 0.0 }
+        Domain { damping: first(self.c), stiffness: first(self.k), load: [self.load, 0.0] }
     }
 }
 

@@ -35,7 +35,6 @@ pub(crate) fn pair(omega: f64) -> (Pair, Law) {
         damping: [[2.0 * ZETA + c, -c], [-c, c]],
         stiffness: [[1.0 + k, -k], [-k, k]],
         load: [0.0; 2],
-        preload: 0.0,
     };
     let oscillator = Pair {
         mass: [[1.0, 0.0], [0.0, MU]],
@@ -88,12 +87,8 @@ pub(crate) const SINK: Damper = Damper {
 impl Damper {
     pub(crate) fn pair(&self) -> (Pair, Law) {
         let first = |value: f64| [[value, 0.0], [0.0; 2]];
-        let domain = Domain {
-            damping: first(self.damping),
-            stiffness: first(self.stiffness),
-            load: [0.0; 2],
-            preload: 0.0,
-        };
+        let domain =
+            Domain { damping: first(self.damping), stiffness: first(self.stiffness), load: [0.0; 2] };
         let oscillator = Pair {
             mass: [[self.mass, 0.0], [0.0, self.free_mass]],
             gap: [1.0, -1.0],

@@ -111,10 +111,10 @@ pub(crate) fn cycles() -> Vec<Cycle> {
 #[test]
 fn motion_from_rest_agrees_with_closed_forms() {
     for cycle in cycles() {
-        let Form::Pair(pair) = &cycle.oscillator else { panic!("{}", cycle.what) };
-        let omega = pair.omega;
-        let found = followed(pair, cycle.law, REST, 3);
-        let [x, v] = run(omega, pair.force[0], [0.0; 2], 3).y;
+        let Form::Machine(machine) = &cycle.oscillator else { panic!("{}", cycle.what) };
+        let omega = machine.omega;
+        let found = followed(&cycle.oscillator, cycle.law, REST, 3);
+        let [x, v] = run(omega, machine.drives[0].cos[0], [0.0; 2], 3).y;
         let off = apart(found.end, state(&[x, v]));
         assert!(off < 1e-12, "omega = {omega}: {off:e}");
     }

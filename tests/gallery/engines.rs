@@ -238,7 +238,7 @@ fn bars(precision: Precision) -> [f64; 3] {
 /// Which closed forms lanes are compared with: each group needs a shader of its own.
 #[derive(Clone, Copy, PartialEq)]
 enum Group {
-    /// Pairs with one wall on a side and a force of one harmonic, without stages.
+    /// Pairs with a force of one harmonic, without stages.
     Plain,
     Pairs,
     Machines,
@@ -246,9 +246,9 @@ enum Group {
 
 impl Group {
     fn has(self, known: &Known) -> bool {
-        let Features { machine, harmonics, stages, intervals, .. } = Features::of(&known.oscillator);
+        let Features { machine, harmonics, stages, .. } = Features::of(&known.oscillator);
         match self {
-            Group::Plain => machine.is_none() && harmonics == 0 && !stages && !intervals,
+            Group::Plain => machine.is_none() && harmonics == 0 && !stages,
             Group::Pairs => machine.is_none(),
             Group::Machines => machine.is_some(),
         }

@@ -1,5 +1,4 @@
-//! Further harmonics of the force, domains that change in a forcing period, several walls on a side, and walls that only push, on
-//! lanes and on the reference.
+//! Further harmonics of the force, and domains that change in a forcing period, on lanes and on the reference.
 //!
 //! The lanes need an adapter; without one the tests fail (see `scripts/test.sh`).
 
@@ -14,7 +13,7 @@ use rattlemap::map::engine::measured_record;
 use rattlemap::map::plan::Needs;
 use rattlemap::record::Record;
 use rattlemap::record::classify::classify;
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Model, OuterWall, Pair, REST, Stage, state};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, Model, Pair, REST, Stage, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Budget, Class, measure};
 use rayon::prelude::*;
@@ -54,7 +53,6 @@ fn changed(domain: &Domain, gap: [f64; 2], stiffness: f64, damping: f64, load: [
         damping: along(domain.damping, damping),
         stiffness: along(domain.stiffness, stiffness),
         load: [0, 1].map(|i| domain.load[i] + load[i]),
-        preload: 0.0,
     }
 }
 
@@ -86,87 +84,6 @@ fn with_stages(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
     (oscillator, law, start)
 }
 
-/// Makes walls elastic, and puts one to three further walls behind them; only the last one may have another law.
-fn with_walls(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
-    let mut draw = Numbers(seed ^ 0x3a11);
-    let gap = oscillator.gap;
-    let stages: Vec<Domain> = oscillator.stages.iter().map(|stage| stage.free).collect();
-    let mut sides: Vec<usize> = (0..2).filter(|&side| oscillator.walls[side].is_finite()).collect();
-    if sides.len() == 2 && draw.one_of(&[true, false]) {
-        sides.remove(draw.one_of(&[0, 1]));
-    }
-    for side in sides {
-        let count = draw.one_of(&[1, 2, 3]);
-        let sign = [1.0, -1.0][side];
-        let mut at = oscillator.walls[side];
-        let mut before: Vec<Domain> = [oscillator.free].into_iter().chain(stages.clone()).collect();
-        let last = oscillator.contacts[side];
-        oscillator.contacts[side] = Contact::Elastic;
-        for nth in 0..=count {
-            let (k, c) = (draw.between(1.0, 40.0), draw.one_of(&[0.0, 1.0]) * draw.between(0.0, 1.0));
-            let load = [0, 1].map(|i: usize| k * at * gap[i]);
-            let behind: Vec<Domain> = before.iter().map(|domain| changed(domain, gap, k, c, load)).collect();
-            if nth == 0 {
-                oscillator.meshing[side] = behind[0];
-                for (stage, &domain) in oscillator.stages.iter_mut().zip(&behind[1..]) {
-                    stage.meshing[side] = domain;
-                }
-            } else {
-                let contact = if nth == count { last } else { Contact::Elastic };
-                oscillator.outer_walls[side].push(OuterWall { at, contact, meshing: behind.clone() });
-            }
-            before = behind;
-            at += sign * draw.between(0.05, 0.3);
-        }
-    }
-    (oscillator, law, start)
-}
-
-/// Makes the last walls elastic, unless they are rigid. Most only push, and most have a preload.
-fn with_pushing(seed: u64, (mut oscillator, law, start): Cell) -> Cell {
-    let mut draw = Numbers(seed ^ 0x9a55);
-    let gap = oscillator.gap;
-    for side in (0..2).filter(|&side| oscillator.walls[side].is_finite()) {
-        let sign = [1.0, -1.0][side];
-        let contact = draw.one_of(&[Contact::Pushing, Contact::Pushing, Contact::Elastic]);
-        let least = if contact == Contact::Pushing { 0.0 } else { -0.5 };
-        let size = draw.one_of(&[0.0, 1.0, 1.0]) * draw.between(least, 1.5);
-        let preload = |domain: &mut Domain| {
-            domain.preload = size;
-            (0..2).for_each(|i| domain.load[i] -= sign * size * gap[i]);
-        };
-        match oscillator.outer_walls[side].last_mut() {
-            Some(last) if last.contact != Contact::Rigid => {
-                last.contact = contact;
-                last.meshing.iter_mut().for_each(preload);
-            }
-            None if oscillator.contacts[side] != Contact::Rigid => {
-                oscillator.contacts[side] = contact;
-                let stages = oscillator.stages.iter_mut().map(|stage| &mut stage.meshing[side]);
-                stages.chain([&mut oscillator.meshing[side]]).for_each(preload);
-            }
-            _ => {}
-        }
-    }
-    (oscillator, law, start)
-}
-
-fn pushing_cells() -> Vec<Cell> {
-    (0..SEEDS).map(|seed| with_pushing(seed, random_cell(seed))).collect()
-}
-
-fn walled_cells() -> Vec<Cell> {
-    (0..SEEDS).map(|seed| with_walls(seed, random_cell(seed))).chain(chattering_clutches()).collect()
-}
-
-/// Clutches whose hub comes to rest on a stop by many impacts, while the springs in front of the stop stay in contact.
-fn chattering_clutches() -> impl Iterator<Item = Cell> {
-    [(0.197, 2.496), (0.148, 3.0)].into_iter().map(|(omega, force)| {
-        let model = built_in("clutch", &[("omega", omega), ("F", force)]);
-        (model.pair(), model.law(), REST)
-    })
-}
-
 fn harmonic_cells() -> Vec<Cell> {
     (0..SEEDS).map(|seed| with_harmonics(seed, random_cell(seed))).collect()
 }
@@ -176,10 +93,7 @@ fn staged_cells() -> Vec<Cell> {
 }
 
 fn cells_with_everything() -> Vec<Cell> {
-    let staged = |seed| with_harmonics(seed, with_stages(seed, random_cell(seed)));
-    let walled = (0..SEEDS).map(|seed| with_walls(seed, staged(seed)));
-    let pushing = (0..SEEDS).map(|seed| with_pushing(seed, with_walls(seed, staged(seed))));
-    walled.chain(pushing).chain(chattering_clutches()).collect()
+    (0..SEEDS).map(|seed| with_harmonics(seed, with_stages(seed, random_cell(seed)))).collect()
 }
 
 /// Returns the reference's record of a cell.
@@ -227,13 +141,8 @@ fn check(what: &str, cells: &[Cell], precisions: &[(Precision, f64, usize)]) {
 }
 
 /// Cells with one feature each.
-fn features() -> [(&'static str, Vec<Cell>); 4] {
-    [
-        ("pushing", pushing_cells()),
-        ("harmonics", harmonic_cells()),
-        ("stages", staged_cells()),
-        ("walls", walled_cells()),
-    ]
+fn features() -> [(&'static str, Vec<Cell>); 2] {
+    [("harmonics", harmonic_cells()), ("stages", staged_cells())]
 }
 
 #[test]
@@ -317,7 +226,6 @@ fn pressed_and_released() -> Vec<Cell> {
         damping: [[0.3, 0.0], [0.0, 0.0]],
         stiffness: [[1.0, 0.0], [0.0, 0.0]],
         load: [load, 0.0],
-        preload: 0.0,
     };
     let [pressed, pulled] = [domain(4.0), domain(-4.0)];
     let of = |i: u32| {
@@ -405,8 +313,7 @@ fn quantities_agree_with_the_reference() {
 
 #[test]
 fn excluded_features_are_refused() {
-    let cells = [("harmonics", harmonic_cells()), ("stages", staged_cells()), ("intervals", walled_cells())];
-    for (excluded, cells) in cells {
+    for (excluded, cells) in features() {
         let error = kinds::run(Precision::F32, &cells[..1], &LaneSettings::only(1)).unwrap_err();
         let is_named = matches!(error, GpuError::NotCompiled { flow: 0, setting, .. } if setting == excluded);
         assert!(is_named, "{excluded}: {error}");

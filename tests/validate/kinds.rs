@@ -104,7 +104,6 @@ fn in_coordinates(o: &Pair, t: [[f64; 2]; 2]) -> Pair {
         damping: congruent(domain.damping),
         stiffness: congruent(domain.stiffness),
         load: covariant(domain.load),
-        preload: 0.0,
     };
     Pair {
         mass: congruent(o.mass),

@@ -141,7 +141,7 @@ impl LinearDomain {
                 let spring = wall.springs[key.stage];
                 stiffness[(gap, gap)] += spring.stiffness;
                 damping[(gap, gap)] += spring.damping;
-                load[gap] += spring.stiffness * wall.at - side.sign() * spring.preload;
+                load[gap] += spring.stiffness * wall.at - side.sign() * spring.force_at_wall();
             }
         }
         // Friction resists, but its power is not that of a damper.

@@ -184,7 +184,7 @@ impl Frame {
             let spring = wall.springs[key.stage];
             row.0[gap] += sign * spring.stiffness;
             row.0[self.n + gap] += sign * spring.damping;
-            row = row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width());
+            row = row.plus(spring.force_at_wall() - sign * spring.stiffness * wall.at, self.width());
         }
         let is_last = key.engaged[gap] == signed(side, self.walls(gap, side).len());
         if let Some(i) = self.curve_of_wall(gap, side).filter(|_| is_last) {

@@ -137,13 +137,13 @@ impl Frame {
         if let Some(i) = self.curve_of_wall(gap, side) {
             // The elongation is `sign` times the gap.
             let [slope, force] = self.springs[i - MOST_FRICTION].curve.pieces[usize::from(pieces[i])];
-            spring.preload += force + sign * slope * wall.at;
+            spring.preload = Some(spring.force_at_wall() + force + sign * slope * wall.at);
             spring.stiffness += slope;
         }
         let mut row = Functional::ZERO;
         row.0[gap] = sign * spring.stiffness;
         row.0[self.n + gap] = sign * spring.damping;
-        row.plus(spring.preload - sign * spring.stiffness * wall.at, self.width())
+        row.plus(spring.force_at_wall() - sign * spring.stiffness * wall.at, self.width())
     }
 
     /// Returns the row of an element's sliding rate.

@@ -286,7 +286,8 @@ impl<'a> Moment<'a> {
             Watch::Wall(gap, direction) => {
                 let wall = self.frame.wall_ahead(self.modes, gap, direction);
                 wall.map(|(side, number)| &self.frame.walls(gap, side)[number]).is_some_and(|wall| {
-                    wall.contact.is_elastic() && wall.springs.iter().all(|spring| spring.preload == 0.0)
+                    wall.contact.is_elastic()
+                        && wall.springs.iter().all(|spring| spring.force_at_wall() == 0.0)
                 })
             }
             Watch::Slips(i, _) => !self.frame.elements[i].falls(),

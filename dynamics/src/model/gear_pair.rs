@@ -45,7 +45,7 @@ impl GearPair {
     /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
-        let spring = Spring { stiffness: self.k, damping: self.r, preload: 0.0 };
+        let spring = Spring { stiffness: self.k, damping: self.r, preload: None };
         let wall = |at: f64| Wall {
             at,
             contact: Contact::Impact,

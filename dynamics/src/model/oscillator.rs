@@ -95,8 +95,15 @@ pub struct Spring {
     pub stiffness: f64,
     /// Damping, >= 0.
     pub damping: f64,
-    /// Constant force behind the wall. It is 0 where the law is [`Contact::Impact`].
-    pub preload: f64,
+    /// Constant force behind the wall, of a model that states one, even if it is 0. It is 0 where the law is [`Contact::Impact`].
+    pub preload: Option<f64>,
+}
+
+impl Spring {
+    /// Returns the contact force of a gap at rest on the wall: the preload, or 0 without one.
+    pub fn force_at_wall(&self) -> f64 {
+        self.preload.unwrap_or(0.0)
+    }
 }
 
 /// Coefficient of restitution, limited to `[0, 1]`.
@@ -159,7 +166,7 @@ impl Wall {
     /// Returns the energy that spring and preload hold in a stage, for a gap `z` behind the wall.
     pub(crate) fn stored(&self, stage: usize, side: Side, z: f64) -> f64 {
         let (spring, depth) = (self.springs[stage], z - self.at);
-        0.5 * spring.stiffness * depth * depth + spring.preload * side.sign() * depth
+        0.5 * spring.stiffness * depth * depth + spring.force_at_wall() * side.sign() * depth
     }
 }
 
@@ -376,7 +383,8 @@ impl Oscillator {
     /// Returns the reason why the oscillator needs the general engine, or none if it is a [`Pair`](super::Pair). The reason does not depend
     /// on values.
     pub fn needs_machine(&self) -> Option<&'static str> {
-        let mut walls = self.gaps.iter().flat_map(|gap| gap.walls.iter().flatten());
+        let has_wall =
+            |what: fn(&Wall) -> bool| self.gaps.iter().flat_map(|gap| gap.walls.iter().flatten()).any(what);
         [
             (self.degrees() > 2, "more than two coordinates"),
             (self.gaps.len() > 1, "several gaps"),
@@ -385,9 +393,15 @@ impl Oscillator {
             (!self.signals.is_empty(), "signals"),
             (self.timing != Timing::Forced, "no force, harmonics or stages"),
             (
-                walls.any(|wall| matches!(wall.restitution, Restitution::BySpeed { .. })),
+                has_wall(|wall| matches!(wall.restitution, Restitution::BySpeed { .. })),
                 "restitution that depends on the approach speed",
             ),
+            (
+                self.gaps.iter().flat_map(|gap| &gap.walls).any(|walls| walls.len() > 1),
+                "several walls on a side",
+            ),
+            (has_wall(|wall| wall.contact == Contact::Pushing), "walls that only push"),
+            (has_wall(|wall| wall.springs.iter().any(|spring| spring.preload.is_some())), "preloads"),
         ]
         .into_iter()
         .find_map(|(is_so, what)| is_so.then_some(what))
@@ -859,9 +873,10 @@ impl Oscillator {
                     wall.at,
                     "so small that the force of its spring is finite",
                 )?;
-                finite(quantity("preload"), *preload)?;
-                let none = wall.contact != Contact::Impact || *preload == 0.0;
-                require(none, quantity("preload"), *preload, "0, because the wall is not elastic")?;
+                let preload = preload.unwrap_or(0.0);
+                finite(quantity("preload"), preload)?;
+                let none = wall.contact != Contact::Impact || preload == 0.0;
+                require(none, quantity("preload"), preload, "0, because the wall is not elastic")?;
             }
         }
         Ok(())
@@ -922,8 +937,8 @@ impl Oscillator {
             for gap in &self.gaps {
                 let springs = gap.walls.iter().flatten().flat_map(|wall| &wall.springs);
                 springs
-                    .filter(|spring| spring.preload != 0.0)
-                    .for_each(|spring| under(&gap.row * spring.preload, 1));
+                    .filter(|spring| spring.force_at_wall() != 0.0)
+                    .for_each(|spring| under(&gap.row * spring.force_at_wall(), 1));
             }
         }
         found

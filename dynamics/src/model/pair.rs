@@ -21,9 +21,6 @@ pub struct Domain {
     pub stiffness: [[f64; 2]; 2],
     /// Constant load.
     pub load: [f64; 2],
-    /// In contact with an elastic wall: the part of the contact force that begins at the wall, positive away from the wall.
-    /// [`load`](Self::load) includes it. Otherwise 0.
-    pub preload: f64,
 }
 
 /// One harmonic of the force: `cos cos(order omega t) + sin sin(order omega t)`.
@@ -46,19 +43,7 @@ pub struct Stage {
     pub meshing: [Domain; 2],
 }
 
-/// A further wall behind an elastic one, such as the second stage of a clutch spring or the stop behind a soft buffer.
-#[derive(Clone, Debug, PartialEq)]
-pub struct OuterWall {
-    /// Position `z`, farther from the opposite side than the walls before it.
-    pub at: f64,
-    /// Contact type; all walls on a side but the outermost are elastic.
-    pub contact: Contact,
-    /// Motion in lasting contact, in each stage; ignored for a rigid wall.
-    pub meshing: Vec<Domain>,
-}
-
-/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing, and further
-/// walls may lie behind an elastic one.
+/// A forced piecewise-linear oscillator of one or two degrees of freedom between two walls. Each wall may be missing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pair {
     /// Degrees of freedom: 1 or 2. With 1, the second displacement has a mass of 1, no forces and no part in the gap,
@@ -89,8 +74,6 @@ pub struct Pair {
     /// Changes of the stage in a forcing period: the phase in turns, in `[0, 1)` and increasing, and the stage that begins there. The last
     /// stage lasts until the first change. Empty if there is only stage 0.
     pub schedule: Vec<(f64, usize)>,
-    /// Further walls behind the right and the left one, from the inside to the outside.
-    pub outer_walls: [Vec<OuterWall>; 2],
 }
 
 impl Pair {
@@ -104,26 +87,12 @@ impl Pair {
         let (degrees, walls) = (oscillator.degrees(), &oscillator.gaps[0].walls);
         let gap = vector(&oscillator.gaps[0].row);
         let mass = mass(&oscillator.mass);
-        let mut outer_walls = walls.each_ref().map(|walls| {
-            let further = walls.iter().skip(1);
-            further
-                .map(|wall| OuterWall { at: wall.at, contact: wall.contact, meshing: Vec::new() })
-                .collect::<Vec<_>>()
-        });
-        let mut stage = |stage: usize| {
+        let stage = |stage: usize| {
             let Forces { damping, stiffness, load } = &oscillator.stages[stage];
-            let (damping, stiffness) = (matrix(damping), matrix(stiffness));
-            let free = Domain { damping, stiffness, load: vector(load), preload: 0.0 };
-            let meshing = Side::BOTH.map(|side| {
-                let own = &walls[side.index()];
-                let first = own.first().map_or(free, |wall| behind(free, gap, side, wall, stage));
-                let mut domain = first;
-                for (wall, outer) in own.iter().skip(1).zip(&mut outer_walls[side.index()]) {
-                    domain = behind(domain, gap, side, wall, stage);
-                    outer.meshing.push(domain);
-                }
-                first
-            });
+            let free = Domain { damping: matrix(damping), stiffness: matrix(stiffness), load: vector(load) };
+            let meshing = walls
+                .each_ref()
+                .map(|walls| walls.first().map_or(free, |wall| behind(free, gap, wall, stage)));
             Stage { free, meshing }
         };
         let Stage { free, meshing } = stage(0);
@@ -148,7 +117,6 @@ impl Pair {
             harmonics: further,
             stages,
             schedule: oscillator.schedule.clone(),
-            outer_walls,
         })
     }
 
@@ -197,86 +165,7 @@ impl Pair {
     /// Returns the oscillator that has one of the stages at all phases.
     pub fn in_stage(&self, stage: usize) -> Pair {
         let Stage { free, meshing } = self.stage(stage);
-        let mut alone = Pair { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() };
-        for wall in alone.outer_walls.iter_mut().flatten() {
-            wall.meshing = wall.meshing.get(stage).copied().into_iter().collect();
-        }
-        alone
-    }
-
-    /// Returns the oscillator between two neighbouring walls of a side, in one stage: between the `nth` wall of the side,
-    /// from 1, and the next one. Its free motion is contact with the first `nth` walls.
-    ///
-    /// At the inner wall the motion continues in the previous interval.
-    ///
-    /// # Panics
-    /// If the side has no further wall behind the `nth` one.
-    pub fn behind(&self, side: Side, nth: usize) -> Pair {
-        let (i, outer) = (side.index(), &self.outer_walls[side.index()]);
-        let domain = |wall: usize| match wall {
-            0 => self.free,
-            1 => self.meshing[i],
-            _ => outer[wall - 2].meshing[0],
-        };
-        let next = &outer[nth - 1];
-        let free = Domain { preload: 0.0, ..domain(nth) };
-        let mut interval = Pair { free, outer_walls: Default::default(), ..self.clone() };
-        interval.walls[i] = next.at;
-        interval.walls[1 - i] = if nth == 1 { self.walls[i] } else { outer[nth - 2].at };
-        interval.contacts[i] = next.contact;
-        interval.contacts[1 - i] = Contact::Elastic;
-        interval.meshing[i] = next.meshing[0];
-        interval.meshing[1 - i] = Domain { preload: domain(nth).preload, ..domain(nth - 1) };
-        interval
-    }
-
-    /// Returns stiffness, damping and constant of the force along the gap by which free motion of this interval differs from `centre`.
-    pub fn force_against(&self, centre: &Domain) -> [f64; 3] {
-        let g = self.gap;
-        let square = g[0] * g[0] + g[1] * g[1];
-        let load = [0, 1].map(|i| self.free.load[i] - centre.load[i]);
-        [
-            along(g, self.free.stiffness, centre.stiffness),
-            along(g, self.free.damping, centre.damping),
-            -(g[0] * load[0] + g[1] * load[1]) / square,
-        ]
-    }
-
-    /// Whether a side has several walls.
-    pub fn has_outer_walls(&self) -> bool {
-        self.outer_walls.iter().any(|walls| !walls.is_empty())
-    }
-
-    /// Whether the last wall of a side only pushes.
-    fn is_pushing(&self, side: Side) -> bool {
-        self.last_wall(side).1 == Contact::Pushing && self.wall(side).is_finite()
-    }
-
-    /// Whether the last wall of any side only pushes.
-    pub fn has_pushing_walls(&self) -> bool {
-        Side::BOTH.into_iter().any(|side| self.is_pushing(side))
-    }
-
-    /// Whether the last wall of a side only pushes, or any of its walls has a preload in any stage.
-    pub fn is_pushing_or_preloaded(&self, side: Side) -> bool {
-        self.is_pushing(side) || self.preloads(side).any(|preload| preload != 0.0)
-    }
-
-    /// Returns the preloads of the walls of a side, in all stages.
-    pub fn preloads(&self, side: Side) -> impl Iterator<Item = f64> + '_ {
-        let outer = self.outer_walls[side.index()].iter().flat_map(|wall| &wall.meshing);
-        let stages =
-            (0..self.stage_count()).map(move |stage| self.stage(stage).meshing[side.index()].preload);
-        let exists = self.wall(side).is_finite();
-        stages.chain(outer.map(|domain| domain.preload)).filter(move |_| exists)
-    }
-
-    /// Returns position and law of the last wall of a side, from the inside to the outside. A missing wall is infinitely far.
-    pub fn last_wall(&self, side: Side) -> (f64, Contact) {
-        match self.outer_walls[side.index()].last() {
-            Some(wall) => (wall.at, wall.contact),
-            None => (self.wall(side), self.contacts[side.index()]),
-        }
+        Pair { free, meshing, stages: Vec::new(), schedule: Vec::new(), ..self.clone() }
     }
 
     /// Returns the highest order of the force's harmonics, 1 or more.
@@ -388,11 +277,6 @@ impl Pair {
         self.wall(side).is_finite() && self.contacts[side.index()].is_elastic()
     }
 
-    /// Returns the preload of an elastic wall; 0 for other walls.
-    pub fn preload(&self, side: Side) -> f64 {
-        if self.is_elastic(side) { self.meshing[side.index()].preload } else { 0.0 }
-    }
-
     /// Returns the stiffness and damping that a wall adds along the gap row; 0 if no motion continues behind it.
     pub fn wall_stiffness_and_damping(&self, side: Side) -> [f64; 2] {
         if !self.has_motion_behind(side) {
@@ -422,11 +306,7 @@ impl Pair {
     /// Returns the domains of the first stage in which there is motion.
     fn domains(&self) -> impl Iterator<Item = &Domain> {
         let behind = Side::BOTH.into_iter().filter(|&side| self.has_motion_behind(side));
-        let outer = self.outer_walls.iter().flatten().filter(|wall| wall.contact != Contact::Rigid);
-        behind
-            .map(|side| &self.meshing[side.index()])
-            .chain([&self.free])
-            .chain(outer.flat_map(|wall| wall.meshing.first()))
+        behind.map(|side| &self.meshing[side.index()]).chain([&self.free])
     }
 
     /// Returns the length, > 0, that tolerances on distances are relative to.
@@ -434,7 +314,7 @@ impl Pair {
     /// It is half the distance of the walls. If a wall is missing or both coincide, it is
     ///
     /// ```text
-    /// max(|wall|, |D force|, |D load|, |D preload g|, |D friction row|),   D = (|K| + omega^2 M)^-1
+    /// max(|wall|, |D force|, |D load|),   D = (|K| + omega^2 M)^-1
     /// ```
     ///
     /// over the existing walls and both displacements, with [`|K|`](Self::energy_stiffness) and `load` of free motion. `|D force|` is the
@@ -466,11 +346,7 @@ impl Pair {
         }
         let deflections = [0, 1].map(|i| swings[i].max(load[i].abs()));
         let walls = self.walls.map(f64::abs).into_iter().filter(|wall| wall.is_finite());
-        let preloads = self.domains().filter(|domain| domain.preload != 0.0);
-        let preloads = preloads.flat_map(|domain| {
-            self.deflections(self.gap.map(|g| domain.preload * g), self.omega).map(f64::abs)
-        });
-        walls.chain(deflections).chain(preloads).fold(LEAST_LENGTH, f64::max)
+        walls.chain(deflections).fold(LEAST_LENGTH, f64::max)
     }
 
     fn deflections(&self, force: [f64; 2], omega: f64) -> [f64; 2] {
@@ -487,48 +363,35 @@ impl Pair {
     /// solutions to solutions. The force must then have odd harmonics only, and stages must recur, mirrored, after half a
     /// period.
     pub fn mirror_symmetric(&self) -> bool {
-        let [right, left] = &self.outer_walls;
         // `i` and `j` are stages half a period apart.
         let is_mirrored = |i: usize, j: usize| {
             let (a, b) = (self.stage(i), self.stage(j));
-            let behind = |(right, left): (&OuterWall, &OuterWall)| {
-                right.contact == Contact::Rigid || right.meshing[i] == mirrored(&left.meshing[j])
-            };
             a.free == mirrored(&b.free)
                 && (!self.has_motion_behind(Side::Right) || a.meshing[0] == mirrored(&b.meshing[1]))
-                && right.iter().zip(left).all(behind)
         };
         self.walls[0] == -self.walls[1]
             && self.contacts[0] == self.contacts[1]
-            && right.len() == left.len()
-            && right
-                .iter()
-                .zip(left)
-                .all(|(right, left)| right.at == -left.at && right.contact == left.contact)
             && self.harmonics.iter().all(|harmonic| harmonic.order % 2 == 1)
             && recurs_after_half_a_period(&self.schedule, is_mirrored)
     }
 }
 
-/// Returns the domain behind a wall, given that in front of it.
-fn behind(before: Domain, gap: [f64; 2], side: Side, wall: &Wall, stage: usize) -> Domain {
+/// Returns the domain behind a wall, given free motion.
+fn behind(free: Domain, gap: [f64; 2], wall: &Wall, stage: usize) -> Domain {
     if wall.contact == Contact::Rigid {
-        return before;
+        return free;
     }
-    let Spring { stiffness, damping, preload } = wall.springs[stage];
-    // A missing preload must not change the sign of a zero.
-    let push = if preload == 0.0 { 0.0 } else { side.sign() * preload };
-    let constant = stiffness * wall.at - push;
+    let Spring { stiffness, damping, .. } = wall.springs[stage];
+    let constant = stiffness * wall.at;
     let along = |matrix: [[f64; 2]; 2], k: f64| {
         // The product of the gap entries comes first, so that the matrix is exactly symmetric.
         let entry = |i: usize, j: usize| plus(matrix[i][j], k * (gap[i] * gap[j]));
         [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
     };
     Domain {
-        damping: along(before.damping, damping),
-        stiffness: along(before.stiffness, stiffness),
-        load: [plus(before.load[0], constant * gap[0]), plus(before.load[1], constant * gap[1])],
-        preload,
+        damping: along(free.damping, damping),
+        stiffness: along(free.stiffness, stiffness),
+        load: [plus(free.load[0], constant * gap[0]), plus(free.load[1], constant * gap[1])],
     }
 }
 

@@ -34,7 +34,7 @@ impl Stops {
     /// [`ModelError`] if a parameter is out of its range, or a matrix entry overflows.
     pub fn oscillator(&self) -> Result<Oscillator, ModelError> {
         self.check()?;
-        let spring = Spring { stiffness: self.stop_stiffness, damping: self.stop_damping, preload: 0.0 };
+        let spring = Spring { stiffness: self.stop_stiffness, damping: self.stop_damping, preload: None };
         let wall = |at: f64| Wall {
             at,
             contact: Contact::Impact,

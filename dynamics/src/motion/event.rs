@@ -85,8 +85,6 @@ pub struct GapEvent {
     pub has_impact: bool,
     /// A code for the kind, the wall, and whether the gap was on the wall. Itineraries are hashed from these codes.
     pub(crate) code: u64,
-    /// For a pair, the interval between walls after the event.
-    pub(crate) interval: i32,
     /// Whether the event ends an infinite series of impacts, which the trajectory replaced by its limit.
     pub(crate) ends_series: bool,
 }

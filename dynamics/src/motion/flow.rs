@@ -176,7 +176,7 @@ impl Flow {
     /// Whether a wall only pushes.
     pub fn has_pushing_walls(&self) -> bool {
         match &self.engine {
-            Engine::Pair(flow) => flow.oscillator.has_pushing_walls(),
+            Engine::Pair(_) => false,
             Engine::Machine(system) => {
                 let mut walls = system.machine().gaps.iter().flat_map(|gap| gap.walls.iter().flatten());
                 walls.any(|wall| wall.contact == Contact::Pushing)

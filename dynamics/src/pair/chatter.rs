@@ -110,7 +110,7 @@ impl<const N: usize> PairMotion<'_, N> {
         self.phasor = [cos, sin];
         let before = self.q;
         self.short_flight = false;
-        self.record_in(self.interval, EventKind::MeshStart, side, before, true, observer);
+        self.record_event(EventKind::MeshStart, side, before, true, observer);
         if is_rigid {
             self.rest_on(side);
         } else {

@@ -1,7 +1,7 @@
 //! Events at a wall: impact, start and end of meshing, grazing.
 
 use super::sticking::RELEASE_ORDER;
-use super::{Crossing, Mode, PairMotion, side_of};
+use super::{Crossing, Mode, PairMotion};
 use crate::model::{Contact, Side};
 use crate::motion::{EventKind, GRAZING_SPEED, GapEvent, Observer};
 use crate::pair::flow::{DomainKind, Gap, LinearFlow};
@@ -19,8 +19,7 @@ impl<const N: usize> PairMotion<'_, N> {
                 beyond = 0.0;
             }
             if beyond > 0.0 {
-                self.mode = if self.closes(side) { Mode::Sustained(side) } else { Mode::Open(side) };
-                self.start_from_force(side);
+                self.mode = Mode::Sustained(side);
                 self.origin = Some(side);
             } else if beyond == 0.0 {
                 self.origin = Some(side);
@@ -50,7 +49,6 @@ impl<const N: usize> PairMotion<'_, N> {
             Crossing::MeshEnds(side) if self.flow.contacts[side.index()].is_elastic() => {
                 self.come_out(side, observer);
             }
-            Crossing::ForceChanges(side) => self.change_force(side, observer),
             Crossing::MeshEnds(side) => {
                 self.q[0] = self.flow.wall(side);
                 let rate = self.q[1];
@@ -94,9 +92,6 @@ impl<const N: usize> PairMotion<'_, N> {
         observer: &mut impl Observer,
     ) -> bool {
         match contact {
-            Contact::Elastic | Contact::Pushing => {
-                self.go_behind(side, observer);
-            }
             Contact::Rigid => {
                 if !self.sticks(side) {
                     return false;
@@ -104,6 +99,7 @@ impl<const N: usize> PairMotion<'_, N> {
                 self.stick(side, observer);
             }
             Contact::Impact => return false,
+            _ => self.go_behind(side, observer),
         }
         true
     }
@@ -203,13 +199,12 @@ impl<const N: usize> PairMotion<'_, N> {
 
     /// Counts and reports an event. The first flight comes from no wall, so it has no symbol.
     pub(super) fn record(&mut self, kind: EventKind, side: Side, before: Gap, observer: &mut impl Observer) {
-        self.record_in(self.interval, kind, side, before, false, observer);
+        self.record_event(kind, side, before, false, observer);
     }
 
-    /// Counts and reports an event after which the gap is in a given interval.
-    pub(super) fn record_in(
+    /// Like [`record`](Self::record); `ends_series` tells whether the event replaces an infinite series of impacts.
+    pub(super) fn record_event(
         &mut self,
-        interval: i32,
         kind: EventKind,
         side: Side,
         before: Gap,
@@ -219,14 +214,9 @@ impl<const N: usize> PairMotion<'_, N> {
         let contact = |side: Side| Some(if side == Side::Right { b'1' } else { b'4' });
         let symbol = match (self.mode, self.origin) {
             (Mode::Onset(side) | Mode::Sustained(side) | Mode::Stuck(side), _) => contact(side),
-            (Mode::Free | Mode::Open(_), _) if self.interval != 0 => contact(side_of(self.interval)),
-            (Mode::Free | Mode::Open(_), Some(Side::Right)) => {
-                Some(if side == Side::Right { b'2' } else { b'3' })
-            }
-            (Mode::Free | Mode::Open(_), Some(Side::Left)) => {
-                Some(if side == Side::Left { b'5' } else { b'6' })
-            }
-            (Mode::Free | Mode::Open(_), None) => None,
+            (Mode::Free, Some(Side::Right)) => Some(if side == Side::Right { b'2' } else { b'3' }),
+            (Mode::Free, Some(Side::Left)) => Some(if side == Side::Left { b'5' } else { b'6' }),
+            (Mode::Free, None) => None,
         };
         self.origin = Some(side);
         self.work.events += 1;
@@ -243,15 +233,11 @@ impl<const N: usize> PairMotion<'_, N> {
             t: self.clock.time(),
             before,
             after: self.q,
-            meshing: match kind {
-                EventKind::MeshStart => Some(side),
-                EventKind::Impact | EventKind::MeshEnd => (interval != 0).then(|| side_of(interval)),
-            },
+            meshing: (kind == EventKind::MeshStart).then_some(side),
             has_impact: kind != EventKind::MeshEnd
                 && !self.flow.contacts[side.index()].is_elastic()
                 && !ends_series,
             code: 1 + u64::from(side == Side::Right) + 2 * u64::from(is_on_wall) + 4 * kind as u64,
-            interval,
             ends_series,
         };
         let after = self.q;
@@ -261,7 +247,7 @@ impl<const N: usize> PairMotion<'_, N> {
     /// Corrects a start of a step that rounding has put on or beyond its boundary, as when an event lies within
     /// rounding of the strobe. Returns whether there was anything to correct.
     pub(super) fn settle_start(&mut self, observer: &mut impl Observer) -> bool {
-        if self.from_wall.is_some() || self.from_force > 0 {
+        if self.from_wall.is_some() {
             return false;
         }
         match self.mode {
@@ -270,15 +256,11 @@ impl<const N: usize> PairMotion<'_, N> {
                 let Some(side) = Side::BOTH.into_iter().find(|&side| beyond(side)) else { return false };
                 self.touch(side, observer);
             }
-            Mode::Sustained(side) | Mode::Open(side) => {
+            Mode::Sustained(side) => {
                 if side.sign() * (self.q[0] - self.flow.wall(side)) > 0.0 {
-                    if self.closes(side) != self.is_open() {
-                        return false;
-                    }
-                    self.act(Crossing::ForceChanges(side), observer);
-                    return true;
+                    return false;
                 }
-                if side.sign() * self.q[1] > 0.0 && !self.is_open() {
+                if side.sign() * self.q[1] > 0.0 {
                     self.act(Crossing::OnsetEnds(side), observer);
                 } else {
                     self.act(Crossing::MeshEnds(side), observer);
@@ -333,12 +315,7 @@ impl<const N: usize> PairMotion<'_, N> {
         let [right, left] = self.flow.walls.map(|wall| (self.q[0] - wall).abs());
         let nearer = if right <= left { Side::Right } else { Side::Left };
         let is_let_go = self.from_wall == Some((nearer, RELEASE_ORDER));
-        if self.flow.contacts[nearer.index()].is_elastic() {
-            // A preload makes the force jump at the wall.
-            self.near_grazing |= self.flow.preloads[nearer.index()] != [0.0; 2];
-        } else if !is_let_go {
-            self.near_grazing = true;
-        }
+        self.near_grazing |= !self.flow.contacts[nearer.index()].is_elastic() && !is_let_go;
     }
 
     /// Takes the shortest step although it is undecided: a contact on it is within rounding of grazing. If the step

@@ -45,7 +45,6 @@ mod functional;
 mod gap_polynomial;
 mod generator;
 mod linear;
-mod pushing;
 mod short_flight;
 mod taylor;
 
@@ -55,7 +54,6 @@ pub(crate) use expansion::{EXPANSION_REACH, Expansion, TERMS, turned};
 pub(crate) use functional::PairFunctional;
 pub use linear::LinearFlow;
 pub(crate) use linear::Step;
-pub(crate) use pushing::PushingForce;
 pub(crate) use short_flight::LONGEST_SHORT_FLIGHT;
 pub(crate) use taylor::RADIUS;
 
@@ -109,10 +107,6 @@ pub struct PairFlow {
     pub(crate) kick: f64,
     /// Decrease of `w'` and `v'` per unit of `w` by the damper behind each elastic wall.
     pub(crate) dampers: [[f64; 2]; 2],
-    /// Decrease of `w'` and `v'` at each elastic wall by its preload.
-    pub(crate) preloads: [[f64; 2]; 2],
-    /// Forces of walls that only push.
-    pub(crate) pushing: [Option<Box<PushingForce>>; 2],
     gap: [f64; 2],
     other: usize,
     pub(crate) degrees: usize,
@@ -124,10 +118,6 @@ pub struct PairFlow {
     compliance: f64,
     free: LinearFlow,
     meshing: [LinearFlow; 2],
-    /// Stiffness, damping and constant of the force of the walls in front of this interval, along the gap.
-    held: Option<[f64; 3]>,
-    /// Flows of the intervals behind the first right wall and the first left wall, from the inside to the outside.
-    behind: [Vec<PairFlow>; 2],
     /// Flows of the further stages, and the changes of the stage: time since phase 0, and the stage that begins there.
     stages: Vec<PairFlow>,
     schedule: Vec<(f64, usize)>,
@@ -153,36 +143,14 @@ impl PairFlow {
             flow.stages.iter().map(|stage| stage.free.rate).fold(flow.free.rate, f64::max) * flow.length;
         flow.speed = speed;
         let units = (flow.length, speed, flow.escape);
-        flow.stages.iter_mut().for_each(|stage| stage.set_units(units));
-        flow.behind.iter_mut().flatten().for_each(|interval| interval.set_units(units));
-        flow
-    }
-
-    fn set_units(&mut self, units: (f64, f64, f64)) {
-        (self.length, self.speed, self.escape) = units;
-        self.behind.iter_mut().flatten().for_each(|interval| interval.set_units(units));
-    }
-
-    /// Computes the flow of the first stage, in all intervals between walls.
-    fn in_one_stage(oscillator: &Pair) -> PairFlow {
-        let mut flow = PairFlow::in_one_interval(oscillator);
-        let units = (flow.length, flow.speed, flow.escape);
-        for side in Side::BOTH {
-            let interval = |nth| {
-                let interval = oscillator.behind(side, nth);
-                let mut flow = PairFlow::in_one_interval(&interval);
-                flow.held = Some(interval.force_against(&oscillator.free));
-                flow.set_units(units);
-                flow
-            };
-            flow.behind[side.index()] =
-                (1..=oscillator.outer_walls[side.index()].len()).map(interval).collect();
+        for stage in &mut flow.stages {
+            (stage.length, stage.speed, stage.escape) = units;
         }
         flow
     }
 
-    /// Computes the flow between the first walls, in one stage.
-    fn in_one_interval(oscillator: &Pair) -> PairFlow {
+    /// Computes the flow of the first stage.
+    fn in_one_stage(oscillator: &Pair) -> PairFlow {
         let other = oscillator.other();
         let free = LinearFlow::new(oscillator, &oscillator.free);
         let compliance = oscillator.mobility(oscillator.gap);
@@ -191,9 +159,7 @@ impl PairFlow {
         let behind = |side: Side| match oscillator.contacts[side.index()] {
             _ if oscillator.wall(side).is_infinite() => free.clone(),
             Contact::Rigid => LinearFlow::on_rigid_wall(oscillator, kick),
-            Contact::Impact | Contact::Elastic | Contact::Pushing => {
-                LinearFlow::new(oscillator, &oscillator.meshing[side.index()])
-            }
+            _ => LinearFlow::new(oscillator, &oscillator.meshing[side.index()]),
         };
         let damper = |side: Side| {
             let damping = if oscillator.is_elastic(side) {
@@ -207,17 +173,7 @@ impl PairFlow {
             Contact::Rigid => oscillator.free.dissipation(),
             _ => oscillator.meshing[side.index()].dissipation(),
         };
-        let preload = |side: Side| {
-            let push = side.sign() * oscillator.preload(side);
-            [push * compliance, push * pushed]
-        };
         let meshing = Side::BOTH.map(behind);
-        let pushing =
-            Side::BOTH.map(|side| PushingForce::new(oscillator, side, [&free, &meshing[side.index()]]));
-        let contacts = Side::BOTH.map(|side| match oscillator.contacts[side.index()] {
-            Contact::Pushing if pushing[side.index()].is_none() => Contact::Elastic,
-            contact => contact,
-        });
         let length = oscillator.length_scale();
         PairFlow {
             period: oscillator.period(),
@@ -228,11 +184,9 @@ impl PairFlow {
             oscillator: oscillator.clone(),
             speed: length * free.rate,
             rate: power_of_two(oscillator.omega),
-            contacts,
+            contacts: oscillator.contacts,
             kick,
             dampers: Side::BOTH.map(damper),
-            preloads: Side::BOTH.map(preload),
-            pushing: pushing.map(|force| force.map(Box::new)),
             gap: oscillator.gap,
             other,
             degrees: oscillator.degrees,
@@ -242,8 +196,6 @@ impl PairFlow {
             compliance,
             free,
             meshing,
-            held: None,
-            behind: Default::default(),
             stages: Vec::new(),
             schedule: Vec::new(),
             rigid_mode: None,
@@ -262,49 +214,6 @@ impl PairFlow {
         self.stages.iter().map(of).fold(of(self), f64::max)
     }
 
-    /// Returns the flow of an interval between neighbouring walls: 0 between the first walls, `n` behind the nth right wall, `-n`
-    /// behind the nth left wall. The last wall of a side bounds its last interval.
-    #[inline]
-    pub(crate) fn interval(&self, interval: i32) -> &PairFlow {
-        match interval {
-            0 => self,
-            1.. => &self.behind[0][interval as usize - 1],
-            _ => &self.behind[1][interval.unsigned_abs() as usize - 1],
-        }
-    }
-
-    /// Whether there is such an [interval](Self::interval).
-    pub(crate) fn has_interval(&self, interval: i32) -> bool {
-        let side = if interval > 0 { 0 } else { 1 };
-        interval.unsigned_abs() as usize <= self.behind[side].len()
-    }
-
-    /// Returns the interval of a gap. A gap on a wall is in the interval before it.
-    pub(crate) fn interval_of(&self, gap: f64) -> i32 {
-        let passed = |side: Side| {
-            let count = self.behind[side.index()].len();
-            // The inner wall of each interval.
-            let wall = |nth: usize| self.interval(side.sign() as i32 * nth as i32).wall(side.mirrored());
-            (1..=count).take_while(|&nth| side.sign() * (gap - wall(nth)) > 0.0).count() as i32
-        };
-        passed(Side::Right) - passed(Side::Left)
-    }
-
-    /// Returns the force of the lasting compliant contacts in a domain, if there are any.
-    pub(crate) fn contact_force(&self, kind: DomainKind) -> Option<ContactForce> {
-        let own = match kind {
-            DomainKind::Meshing(side) if self.is_compliant(side) => {
-                Some((self.wall_force(side), self.wall(side), side.sign() * self.oscillator.preload(side)))
-            }
-            _ => None,
-        };
-        if own.is_none() && self.held.is_none() {
-            return None;
-        }
-        let ([stiffness, damping], wall, preload) = own.unwrap_or_default();
-        Some(ContactForce { stiffness, damping, wall, preload, held: self.held.unwrap_or_default() })
-    }
-
     fn stage(&self, stage: usize) -> &PairFlow {
         if stage == 0 { self } else { &self.stages[stage - 1] }
     }
@@ -312,8 +221,7 @@ impl PairFlow {
     /// Returns the memory that the flow occupies, in bytes.
     pub fn bytes(&self) -> usize {
         let domains = [&self.free, &self.meshing[0], &self.meshing[1]];
-        let of_stages =
-            self.stages.iter().chain(self.behind.iter().flatten()).map(PairFlow::bytes).sum::<usize>();
+        let of_stages = self.stages.iter().map(PairFlow::bytes).sum::<usize>();
         size_of::<PairFlow>() + domains.map(LinearFlow::heap_bytes).iter().sum::<usize>() + of_stages
     }
 
@@ -421,31 +329,6 @@ impl PairFlow {
         let (sin, cos) = phase.sin_cos();
         let q = self.domain(kind).propagate(self.to_gap(y), [cos, sin], tau);
         self.to_state(q)
-    }
-}
-
-/// The force along the gap of all lasting compliant contacts: with the wall of the domain, and with the walls in front of the interval.
-pub(crate) struct ContactForce {
-    stiffness: f64,
-    damping: f64,
-    wall: f64,
-    preload: f64,
-    held: [f64; 3],
-}
-
-impl ContactForce {
-    /// Returns the force, positive to the left.
-    pub(crate) fn at(&self, q: &Gap) -> f64 {
-        let [stiffness, damping, constant] = self.held;
-        let own = self.stiffness * (q[0] - self.wall) + self.damping * q[1] + self.preload;
-        own + (stiffness * q[0] + damping * q[1] + constant)
-    }
-
-    /// Returns the rate of the force, given the acceleration of the gap.
-    pub(crate) fn rate(&self, q: &Gap, acceleration: f64) -> f64 {
-        let [stiffness, damping, _] = self.held;
-        let own = self.stiffness * q[1] + self.damping * acceleration;
-        own + (stiffness * q[1] + damping * acceleration)
     }
 }
 

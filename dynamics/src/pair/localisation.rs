@@ -69,10 +69,6 @@ impl<const N: usize> PairMotion<'_, N> {
                 side.sign() * (q[0] - self.flow.wall(side)) < 0.0
             }
             Crossing::MeshEnds(side) => side.sign() * (q[0] - self.flow.wall(side)) > 0.0,
-            Crossing::ForceChanges(side) => {
-                let force = self.wall_force(side, linear, q, phasor)[0];
-                if self.is_open() { force < 0.0 } else { force > 0.0 }
-            }
             Crossing::Through(side) => side.sign() * (q[0] - self.flow.wall(side.mirrored())) > 0.0,
             Crossing::PressingEnds(side) => side.sign() * linear.acceleration(q, phasor) > 0.0,
         }
@@ -107,12 +103,7 @@ impl<const N: usize> PairMotion<'_, N> {
                     series[0] += self.q[0] - self.flow.wall(side.mirrored());
                     root_near(&series, u - expansion.start, u)
                 }
-                Crossing::PressingEnds(_) => {
-                    root_of(linear, &expansion, u, |q, phasor| linear.acceleration_rates(q, phasor))
-                }
-                Crossing::ForceChanges(side) => {
-                    root_of(linear, &expansion, u, |q, phasor| self.wall_force(side, linear, q, phasor))
-                }
+                Crossing::PressingEnds(_) => pressing_end(linear, &expansion, u),
             };
             let next = expansion.start + root.unwrap_or(f64::NAN);
             let is_within = next >= lo * (1.0 - BRACKET_ROUNDING) && next <= hi * (1.0 + BRACKET_ROUNDING);
@@ -136,18 +127,13 @@ impl<const N: usize> PairMotion<'_, N> {
     }
 }
 
-/// Finds the time on an expansion at which a function vanishes, by Newton's method from `u`. `rates` returns the function and its first
-/// two time derivatives.
+/// Finds the time on an expansion at which the pressing acceleration vanishes, by Newton's method from `u`.
 #[inline(never)]
-fn root_of(
-    linear: &LinearFlow,
-    expansion: &Expansion,
-    u: f64,
-    rates: impl Fn(&Gap, &Phasor) -> [f64; 3],
-) -> Option<f64> {
+fn pressing_end(linear: &LinearFlow, expansion: &Expansion, u: f64) -> Option<f64> {
     let mut v = u - expansion.start;
     for _ in 0..POLISH_CAP {
-        let [value, rate, bend] = rates(&expansion.state(v), &expansion.phasor(linear.turn * v));
+        let [value, rate, bend] =
+            linear.acceleration_rates(&expansion.state(v), &expansion.phasor(linear.turn * v));
         let delta = -value / (rate * linear.unit);
         v += delta;
         if v.is_nan() || v.abs() > EXPANSION_REACH {

@@ -1,19 +1,15 @@
 //! Measures the motion of a pair from its events. Between two events there is one flight in one linear domain, and the exact flow gives its
 //! states.
 
-use super::{DomainKind, Gap, LinearFlow, PairFlow, PairMotion, Phasor, Schedule, side_of};
-use crate::model::Contact;
+use super::{DomainKind, Gap, LinearFlow, PairFlow, PairMotion, Phasor, Schedule};
+use crate::model::Side;
 use crate::motion::{EventKind, GapEvent, Sums, nodes, root};
 
 /// The present flight of a motion that is measured.
 #[derive(Clone, Debug)]
 pub(crate) struct PairMeter<'f> {
-    /// The flow of the present stage and interval.
+    /// The flow of the present stage.
     flow: &'f PairFlow,
-    /// The flow of the present stage, in all intervals.
-    stage: &'f PairFlow,
-    /// The present interval between walls.
-    interval: i32,
     schedule: Schedule<'f>,
     /// Domain, state and time since phase 0 at the beginning of the present flight.
     kind: DomainKind,
@@ -25,13 +21,9 @@ pub(crate) struct PairMeter<'f> {
 impl<'f> PairMeter<'f> {
     /// Begins at phase 0, at the present state of a motion.
     pub(crate) fn new<const N: usize>(motion: &PairMotion<'f, N>) -> PairMeter<'f> {
-        let (schedule, stage) = Schedule::new(motion.schedule.whole);
-        let interval = motion.interval();
-        let flow = stage.interval(interval);
+        let (schedule, flow) = Schedule::new(motion.schedule.whole);
         PairMeter {
             flow,
-            stage,
-            interval,
             schedule,
             kind: motion.domain(),
             q: flow.to_gap(motion.state()),
@@ -49,8 +41,7 @@ impl<'f> PairMeter<'f> {
                 self.q[2] = 0.0;
             }
             self.t = 0.0;
-            let first = self.schedule.restart();
-            self.enter_stage(first);
+            self.flow = self.schedule.restart();
             self.period += 1;
         }
     }
@@ -62,17 +53,12 @@ impl<'f> PairMeter<'f> {
                 self.q = self.fly(change - self.t, sums);
                 self.t = change;
             }
-            let next = self.schedule.change();
-            self.enter_stage(next);
+            self.flow = self.schedule.change();
         }
         if until > self.t {
             self.q = self.fly(until - self.t, sums);
         }
         self.t = until;
-    }
-
-    fn enter_stage(&mut self, stage: &'f PairFlow) {
-        (self.stage, self.flow) = (stage, stage.interval(self.interval));
     }
 
     /// Measures the present flight over a time within one stage, and returns its end.
@@ -159,64 +145,39 @@ impl<'f> PairMeter<'f> {
         match which {
             0 | 1 => self.flow.displacements(*q)[2 * which + 1],
             2 => q[1],
-            _ => self
-                .flow
-                .contact_force(self.kind)
-                .map_or(0.0, |force| force.rate(q, linear.acceleration(q, phasor))),
+            _ => self.compliant_side().map_or(0.0, |side| {
+                let [stiffness, damping] = self.flow.wall_force(side);
+                stiffness * q[1] + damping * linear.acceleration(q, phasor)
+            }),
         }
     }
 
-    /// Returns the force of the compliant contacts, positive if it presses.
+    /// Returns the side of the present contact if it is compliant.
+    fn compliant_side(&self) -> Option<Side> {
+        match self.kind {
+            DomainKind::Meshing(side) if self.flow.is_compliant(side) => Some(side),
+            _ => None,
+        }
+    }
+
+    /// Returns the force of a compliant contact, positive if it presses.
     fn compliant_force(&self, q: &Gap) -> Option<f64> {
-        let side = match self.kind {
-            DomainKind::Meshing(side) => side,
-            DomainKind::Free => side_of(self.interval),
-        };
-        self.flow.contact_force(self.kind).map(|force| side.sign() * force.at(q))
-    }
-
-    /// Returns the flow after an event, which a change of the stage may have caused.
-    fn flow_after(&self, event: &GapEvent) -> &'f PairFlow {
-        let mut schedule = self.schedule;
-        let stage = match schedule.next_change() {
-            Some(change) if change == event.t => schedule.change(),
-            None if event.t == self.flow.period => schedule.restart(),
-            _ => self.stage,
-        };
-        stage.interval(self.interval)
-    }
-
-    /// Returns the energy of a wall's spring and preload at an event.
-    fn stored(&self, event: &GapEvent, flow: &PairFlow) -> f64 {
-        let side = event.side;
-        let depth = event.before[0] - flow.wall(side);
-        let of_spring = 0.5 * flow.wall_force(side)[0] * depth * depth;
-        match flow.oscillator.preload(side) {
-            0.0 => of_spring,
-            preload => of_spring + preload * depth.abs(),
-        }
+        let side = self.compliant_side()?;
+        let [stiffness, damping] = self.flow.wall_force(side);
+        Some(side.sign() * (stiffness * (q[0] - self.flow.wall(side)) + damping * q[1]))
     }
 
     /// Adds the energy that a contact dissipates at an instant.
     fn contact(&self, event: &GapEvent, sums: &mut Sums) {
         let (side, flow) = (event.side, self.flow);
         let kinetic = |w: f64| 0.5 * w * w / flow.compliance();
-        if flow.oscillator.contacts[side.index()] == Contact::Pushing {
-            let [before, after] = match event.kind {
-                EventKind::MeshEnd => [self.stored(event, self.flow), 0.0],
-                _ => [0.0, self.stored(event, self.flow_after(event))],
-            };
-            sums.released.add(before, after);
-        } else if event.kind == EventKind::MeshEnd {
-            sums.lost.add(self.stored(event, flow), 0.0);
-        } else if flow.contacts[side.index()].is_elastic() {
-            sums.lost.add(0.0, self.stored(event, flow));
-        } else {
-            if event.ends_series {
-                // The series of impacts dissipates the energy with which the gap left the wall.
-                sums.lost.add(kinetic(self.q[1]), 0.0);
-                return;
-            }
+        if event.kind == EventKind::MeshEnd {
+            let depth = event.before[0] - flow.wall(side);
+            sums.lost.add(0.5 * flow.wall_force(side)[0] * depth * depth, 0.0);
+        } else if event.ends_series {
+            // The series of impacts dissipates the energy with which the gap left the wall.
+            sums.lost.add(kinetic(self.q[1]), 0.0);
+        } else if event.has_impact {
             let approach = side.sign() * event.before[1];
             sums.lost.add(kinetic(approach), kinetic(event.after[1]));
             sums.approach(side, approach);
@@ -237,15 +198,11 @@ impl<'f> PairMeter<'f> {
         } else {
             self.fly_to(event.t, sums);
         }
-        if event.interval == self.interval {
-            self.contact(event, sums);
-        }
+        self.contact(event, sums);
         self.kind = match event.kind {
-            EventKind::MeshStart if event.interval == self.interval => DomainKind::Meshing(event.side),
+            EventKind::MeshStart => DomainKind::Meshing(event.side),
             _ => DomainKind::Free,
         };
-        self.interval = event.interval;
-        self.flow = self.stage.interval(self.interval);
         self.q = event.after;
         self.t = event.t;
         self.include(&event.after, event.t, sums);

@@ -2,7 +2,7 @@
 //!
 //! State and tangents are continuous there, because the phase of a change is the same for all neighbouring motions. A gap in front of a
 //! wall stays in free motion, and a gap behind a wall stays in contact. A contact that depends on a force is decided again: a gap at rest
-//! on a rigid wall, a contact onset, and a gap behind a wall that only pushes.
+//! on a rigid wall, and a contact onset.
 
 use super::{Mode, PairMotion};
 use crate::motion::{EventKind, Observer};
@@ -13,8 +13,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     #[cold]
     #[inline(never)]
     pub(super) fn enter_stage(&mut self, flow: &'f PairFlow, observer: &mut impl Observer) {
-        self.stage = flow;
-        self.flow = flow.interval(self.interval);
+        self.flow = flow;
         self.short_flight = false;
         let levels = |kind: DomainKind| self.flow.domain(kind).levels - 1;
         let in_contact = if self.mode == Mode::Free { self.level[1] } else { levels(self.mode.domain()) };
@@ -32,10 +31,6 @@ impl<'f, const N: usize> PairMotion<'f, N> {
                     // A contact that begins at this instant starts on its wall.
                     self.from_wall = self.from_wall.map(|_| (side, 1));
                 }
-            }
-            Mode::Sustained(side) | Mode::Open(side) if self.closes(side) == self.is_open() => {
-                self.change_force(side, observer);
-                self.start_from_force(side);
             }
             _ => {}
         }

@@ -53,19 +53,14 @@ impl<'f, const N: usize> PairMotion<'f, N> {
         y: PairState,
         tangents: [PairState; N],
     ) -> Self {
-        let (schedule, stage) = Schedule::new(flow);
-        let interval = stage.interval_of(stage.to_gap(y)[0]);
-        let flow = stage.interval(interval);
+        let (schedule, flow) = Schedule::new(flow);
         let mut trajectory = PairMotion {
             flow,
-            stage,
-            interval,
             schedule,
             law,
             mode: Mode::Free,
             origin: None,
             from_wall: None,
-            from_force: 0,
             short_flight: false,
             pending: None,
             q: flow.to_gap(y),
@@ -92,14 +87,11 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     pub(crate) fn carrying<const M: usize>(&self, tangents: [PairState; M]) -> PairMotion<'f, M> {
         PairMotion {
             flow: self.flow,
-            stage: self.stage,
-            interval: self.interval,
             schedule: self.schedule,
             law: self.law,
             mode: self.mode,
             origin: self.origin,
             from_wall: self.from_wall,
-            from_force: self.from_force,
             short_flight: self.short_flight,
             pending: self.pending,
             q: self.q,
@@ -124,13 +116,12 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     ///
     /// The state alone does not determine the domain: a gap just in front of a wall may be free or in contact onset.
     pub(crate) fn at<const M: usize>(&self, y: PairState, tangents: [PairState; M]) -> PairMotion<'f, M> {
-        self.start_in(self.interval, self.mode, self.origin, y, tangents)
+        self.start_in(self.mode, self.origin, y, tangents)
     }
 
-    /// Starts a trajectory in a given mode of an interval. If the state lies in another interval, it determines the mode.
+    /// Starts a trajectory in a given mode.
     fn start_in<const M: usize>(
         &self,
-        interval: i32,
         mode: Mode,
         origin: Option<Side>,
         y: PairState,
@@ -138,19 +129,15 @@ impl<'f, const N: usize> PairMotion<'f, N> {
     ) -> PairMotion<'f, M> {
         let mut started = PairMotion::with_tangents(self.schedule.whole, self.law, y, tangents);
         started.allowance = self.allowance();
-        if started.interval != interval {
-            started.origin = origin;
-            return started;
-        }
         // At an elastic wall the state alone determines the mode.
         let is_elastic = |side: Side| started.flow.contacts[side.index()].is_elastic();
-        if let Mode::Sustained(side) | Mode::Open(side) = started.mode
+        if let Mode::Sustained(side) = started.mode
             && is_elastic(side)
         {
             return started;
         }
         let mode = match mode {
-            Mode::Sustained(side) | Mode::Open(side) if is_elastic(side) => Mode::Free,
+            Mode::Sustained(side) if is_elastic(side) => Mode::Free,
             mode => mode,
         };
         if let Mode::Stuck(side) = mode {
@@ -164,8 +151,7 @@ impl<'f, const N: usize> PairMotion<'f, N> {
 
     /// Whether another trajectory has the same mode and comes from the same wall.
     pub(crate) fn has_mode_and_origin_of(&self, other: &PairMotion<'_, N>) -> bool {
-        (self.interval, self.mode, self.origin, self.from_wall)
-            == (other.interval, other.mode, other.origin, other.from_wall)
+        (self.mode, self.origin, self.from_wall) == (other.mode, other.origin, other.from_wall)
     }
 
     /// Whether another trajectory is in the same domain. Contact onset and sustained contact count as different,
@@ -175,14 +161,12 @@ impl<'f, const N: usize> PairMotion<'f, N> {
             let wall = self.flow.wall(side);
             (self.q[0] - wall).abs() <= START_ON_WALL * wall.abs().max(self.flow.length)
         };
-        self.interval == other.interval
-            && (self.mode == other.mode
-                || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between))
+        self.mode == other.mode || self.meshing() == other.meshing() && self.meshing().is_some_and(is_between)
     }
 
     /// Starts a trajectory at phase 0 from the mirror image of the present state, in the mirrored domain.
     pub(crate) fn mirrored<const M: usize>(&self, tangents: [PairState; M]) -> PairMotion<'f, M> {
         let y = self.state().map(|value| -value);
-        self.start_in(-self.interval, self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
+        self.start_in(self.mode.mirrored(), self.origin.map(Side::mirrored), y, tangents)
     }
 }

@@ -22,10 +22,8 @@ pub(super) enum Crossing {
     PressingEnds(Side),
     /// The contact onset reaches the opposite wall.
     Through(Side),
-    /// Sustained or open contact ends at its wall.
+    /// Sustained contact ends at its wall.
     MeshEnds(Side),
-    /// Spring and damper of a wall that only pushes begin or cease to push: contact begins or ends behind the wall.
-    ForceChanges(Side),
 }
 
 /// The verdict on a step.
@@ -50,7 +48,7 @@ impl<const N: usize> PairMotion<'_, N> {
         let [right, left] = self.flow.walls;
         let (floor, ceiling) = match self.mode {
             Mode::Free => (left, right),
-            Mode::Sustained(side) if self.flow.pushing[side.index()].is_none() => match side {
+            Mode::Sustained(side) => match side {
                 Side::Right => (right, f64::INFINITY),
                 Side::Left => (f64::NEG_INFINITY, left),
             },
@@ -72,13 +70,7 @@ impl<const N: usize> PairMotion<'_, N> {
                 self.wall_ahead(&gap, Side::Right, remainder),
                 self.wall_ahead(&gap, Side::Left, remainder),
             ),
-            Mode::Sustained(side) | Mode::Open(side) => {
-                let ends = self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side));
-                match &self.flow.pushing[side.index()] {
-                    Some(force) => first_of(ends, self.force_ahead(force, linear, step, side)),
-                    None => ends,
-                }
-            }
+            Mode::Sustained(side) => self.judge(&gap, side, 1.0, remainder, Crossing::MeshEnds(side)),
             // `step_at_rest` decides.
             Mode::Stuck(_) => StepVerdict::Unclear,
             Mode::Onset(side) => {

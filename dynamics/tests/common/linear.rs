@@ -1,6 +1,6 @@
 //! Linear motion of one degree of freedom in closed form, and oscillators with walls.
 
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Pair, Side, Stage};
+use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Oscillator, Pair, Side, Stage};
 
 /// `x'' + 2 gamma x' + square x = force cos(omega t) + load`, not critically damped.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,6 @@ impl Linear {
             damping: first(2.0 * self.gamma),
             stiffness: first(self.square),
             load: [self.load, 0.0],
-            preload: 0.0,
         };
         Pair { omega: self.omega, force: [self.force, 0.0], ..unforced(1, free) }
     }
@@ -75,7 +74,6 @@ pub(crate) fn unforced(degrees: usize, free: Domain) -> Pair {
         harmonics: Vec::new(),
         stages: Vec::new(),
         schedule: Vec::new(),
-        outer_walls: Default::default(),
         free,
         meshing: [free; 2],
     }
@@ -137,15 +135,13 @@ pub(crate) fn with_wall(
         damping: plus(free.damping, damping),
         stiffness: plus(free.stiffness, stiffness),
         load: [free.load[0] + stiffness * at * g0, free.load[1] + stiffness * at * g1],
-        preload: 0.0,
     };
     walled
 }
 
-/// Adds a preload to the first elastic wall on a side, in the first stage.
-pub(crate) fn with_preload(mut oscillator: Pair, side: Side, preload: f64) -> Pair {
-    let (gap, domain) = (oscillator.gap, &mut oscillator.meshing[usize::from(side == Side::Left)]);
-    domain.preload = preload;
-    (0..2).for_each(|i| domain.load[i] -= side.sign() * preload * gap[i]);
-    oscillator
+/// Replaces the law of the first wall on a side, and its preload in the first stage.
+pub(crate) fn with_law(mut o: Oscillator, side: Side, contact: Contact, preload: Option<f64>) -> Oscillator {
+    let wall = &mut o.gaps[0].walls[side.index()][0];
+    (wall.contact, wall.springs[0].preload) = (contact, preload);
+    o
 }

@@ -135,32 +135,19 @@ pub(crate) fn described(pair: &Pair, law: Law) -> Oscillator {
     let stages: Vec<_> = (0..pair.stage_count()).map(|stage| pair.in_stage(stage)).collect();
     let walls = |side: Side| {
         let i = side.index();
-        let spring = |stage: &Pair, nth: usize| {
-            // The spring of a wall belongs to the interval in front of it.
-            let interval = if nth == 0 { stage.clone() } else { stage.behind(side, nth) };
-            let [stiffness, damping] = interval.wall_stiffness_and_damping(side);
-            let has_damper = interval.meshing[i].damping != interval.free.damping;
-            Spring {
-                stiffness,
-                damping: if has_damper { damping } else { 0.0 },
-                preload: interval.preload(side),
-            }
+        let spring = |stage: &Pair| {
+            let [stiffness, damping] = stage.wall_stiffness_and_damping(side);
+            let has_damper = stage.meshing[i].damping != stage.free.damping;
+            Spring { stiffness, damping: if has_damper { damping } else { 0.0 }, preload: None }
         };
-        let wall = |nth: usize| {
-            let (at, contact) = match nth {
-                0 => (pair.walls[i], pair.contacts[i]),
-                _ => (pair.outer_walls[i][nth - 1].at, pair.outer_walls[i][nth - 1].contact),
-            };
-            Wall {
-                at,
-                contact,
-                restitution: Restitution::Constant(law.restitution[i]),
-                mesh_speed: law.mesh_speed[i],
-                springs: stages.iter().map(|stage| spring(stage, nth)).collect(),
-            }
+        let wall = || Wall {
+            at: pair.walls[i],
+            contact: pair.contacts[i],
+            restitution: Restitution::Constant(law.restitution[i]),
+            mesh_speed: law.mesh_speed[i],
+            springs: stages.iter().map(spring).collect(),
         };
-        let count = usize::from(pair.walls[i].is_finite()) + pair.outer_walls[i].len();
-        (0..count).map(wall).collect()
+        pair.walls[i].is_finite().then(wall).into_iter().collect()
     };
     Oscillator {
         omega: pair.omega,

@@ -121,18 +121,14 @@ fn cases() -> impl Strategy<Value = Case> {
             y,
             (harmonics, stages, phases),
         )| {
-            let free = Domain { damping, stiffness, load, preload: 0.0 };
+            let free = Domain { damping, stiffness, load };
             let mut oscillator =
                 Pair { mass, gap, contacts, omega, force, force_sin, harmonics, ..unforced(2, free) };
             let mut start = state(&[y[0], 3.0 * y[1], y[2], 3.0 * y[3]]);
             if is_single {
                 let first = |m: Matrix| [[m[0][0], 0.0], [0.0, 0.0]];
-                let free = Domain {
-                    damping: first(damping),
-                    stiffness: first(stiffness),
-                    load: [load[0], 0.0],
-                    preload: 0.0,
-                };
+                let free =
+                    Domain { damping: first(damping), stiffness: first(stiffness), load: [load[0], 0.0] };
                 oscillator = Pair {
                     degrees: 1,
                     mass: [[mass[0][0], 0.0], [0.0, 1.0]],
@@ -145,7 +141,7 @@ fn cases() -> impl Strategy<Value = Case> {
                 let Domain { damping, stiffness, load, .. } = oscillator.free;
                 let times = |m: Matrix, factor: f64| m.map(|row| row.map(|x| factor * x));
                 let load = [load[0] + by[0], load[1] + if is_single { 0.0 } else { by[1] }];
-                Domain { damping: times(damping, c), stiffness: times(stiffness, k), load, preload: 0.0 }
+                Domain { damping: times(damping, c), stiffness: times(stiffness, k), load }
             };
             let frees: Vec<Domain> = stages.iter().map(changed).collect();
             if !frees.is_empty() {
@@ -474,7 +470,7 @@ proptest! {
             [[whole[0][0], whole[0][1]], [below, whole[1][1]]]
         };
         let o = &case.oscillator;
-        let domain = |d: &Domain| Domain { damping: congruent(d.damping), stiffness: congruent(d.stiffness), load: row(d.load), preload: 0.0 };
+        let domain = |d: &Domain| Domain { damping: congruent(d.damping), stiffness: congruent(d.stiffness), load: row(d.load) };
         let plain = Pair {
             mass: congruent(o.mass),
             gap: row(o.gap),
@@ -525,7 +521,7 @@ proptest! {
     #[test]
     fn a_harmonic_is_a_force_of_a_multiple_of_the_frequency(case in cases()) {
         let o = &case.oscillator;
-        let plain = Pair { harmonics: Vec::new(), stages: Vec::new(), schedule: Vec::new(), outer_walls: Default::default(), ..o.clone() };
+        let plain = Pair { harmonics: Vec::new(), stages: Vec::new(), schedule: Vec::new(), ..o.clone() };
         let harmonics = vec![Harmonic { order: 2, cos: o.force, sin: o.force_sin }];
         let slow = Pair { omega: 0.5 * o.omega, force: [0.0; 2], force_sin: [0.0; 2], harmonics, ..plain.clone() };
         let (flow, other) = (Flow::new(&plain), Flow::new(&slow));
@@ -542,7 +538,7 @@ proptest! {
         let plain = Pair {
             walls: [f64::INFINITY, f64::NEG_INFINITY],
             stages: Vec::new(),
-            schedule: Vec::new(), outer_walls: Default::default(),
+            schedule: Vec::new(),
             ..transformed(o, |_| free, |_| [0.0; 2])
         };
         let behind = case.behind.map(|[k, _]| [k, 0.0]);
@@ -582,7 +578,6 @@ fn forces_with_different_phases_have_the_closed_form_response() {
         damping: [[1.1, -0.3], [-0.3, 0.8]],
         stiffness: [[9.0, -2.0], [-2.0, 5.0]],
         load: [0.4, -0.7],
-        preload: 0.0,
     };
     let (force, force_sin, omega) = ([3.0, -1.5], [-2.0, 4.0], 1.7);
     let mass = [[2.0, 0.3], [0.3, 1.0]];

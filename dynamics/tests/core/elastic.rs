@@ -201,7 +201,6 @@ fn a_narrow_clearance_is_no_escape() {
             damping: [[0.1, -0.06], [-0.06, 0.03]],
             stiffness: [[1.0, 0.0], [0.0, 1.0]],
             load: [0.0; 2],
-            preload: 0.0,
         };
         let behind = |sign: f64| Domain {
             stiffness: [[31.0, -30.0], [-30.0, 31.0]],

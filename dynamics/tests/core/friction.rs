@@ -16,7 +16,7 @@ use rattlemap_dynamics::orbit::{Class, Orbit, Settings, Status, analyse_flow, me
 /// A single mass on a spring without walls, with `m = k = 1`.
 fn block(omega: f64, drive: f64, friction: f64) -> Rubbing {
     let first = |value: f64| [[value, 0.0], [0.0, 0.0]];
-    let free = Domain { damping: first(0.0), stiffness: first(1.0), load: [0.0; 2], preload: 0.0 };
+    let free = Domain { damping: first(0.0), stiffness: first(1.0), load: [0.0; 2] };
     let pair = Pair { contacts: [Contact::Elastic; 2], omega, force: [drive, 0.0], ..unforced(1, free) };
     Rubbing { pair, friction: vec![Friction { row: [1.0, 0.0], force: friction, speed: 0.0 }] }
 }

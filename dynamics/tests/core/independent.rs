@@ -17,9 +17,9 @@ use crate::machines::agree::{Found, ONE_GAP, compare_case};
 use crate::machines::cycle::{Cycle, follow, settle};
 use crate::machines::engine::program::OneGap;
 use crate::machines::motion::{Mode, Motion};
-use crate::machines::random::{any_case, apart};
+use crate::machines::random::{Case, any_case, apart};
 use crate::machines::system::{ANGLE, System};
-use random::{Case, PLAIN, Shape, case};
+use random::{PLAIN, Shape, case};
 
 /// Allowed effect of rounding errors, as a multiple of the effect of the known errors of [`Motion::shaken`].
 const NOISES: f64 = 20.0;
@@ -64,7 +64,7 @@ struct Compared {
 
 /// Compares a cycle with the reference's. Returns the differences of states and multipliers.
 fn same_cycle(case: &Case, ours: &Cycle, measured: &Measurement, orbit: &Orbit) -> Result<[f64; 2], String> {
-    let off = |state: &[f64]| apart(state, &orbit.strobe[..state.len()], case.oscillator.omega);
+    let off = |state: &[f64]| apart(state, &orbit.strobe[..state.len()], case.machine.omega);
     let at = ours.strobes.iter().map(|(state, ..)| off(state)).fold(f64::INFINITY, f64::min);
     let radius =
         orbit.floquet.as_ref().and_then(|all| all.first()).map_or(f64::NAN, |[re, im]| re.hypot(*im));
@@ -103,25 +103,24 @@ fn same_cycle(case: &Case, ours: &Cycle, measured: &Measurement, orbit: &Orbit) 
 fn confirms(case: &Case, flow: &Flow, ours: &Cycle) -> bool {
     let is_plain = |modes: &[Mode]| matches!(modes[0], Mode::Plain | Mode::Open);
     ours.strobes.iter().find(|(_, modes, _)| is_plain(modes)).is_none_or(|(strobe, ..)| {
-        measure(flow, case.law, state(strobe), &BUDGET).period == Some(ours.strobes.len() as u32)
+        measure(flow, case.machine.law(), state(strobe), &BUDGET).period == Some(ours.strobes.len() as u32)
     })
 }
 
 fn compare(case: &Case) -> Result<Compared, String> {
-    let (whole, flow) = (case.machine(), Flow::new(case.oscillator.form(case.law)));
-    let system = System::new(&whole.machine, ANGLE);
-    let mut theirs = OneGap::new(&flow, case.oscillator.degrees, case.law, case.start);
-    let first = compare_case(&whole, ONE_GAP, &mut theirs)?;
+    let (flow, law, start) = (Flow::new(&case.machine), case.machine.law(), state(&case.start));
+    let system = System::new(&case.machine, ANGLE);
+    let mut theirs = OneGap::new(&flow, case.machine.degrees(), law, start);
+    let first = compare_case(case, ONE_GAP, &mut theirs)?;
     let found = |agreement, off: [f64; 2]| Ok(Compared { agreement, first, off });
-    let measured = measure(&flow, case.law, case.start, &BUDGET);
+    let measured = measure(&flow, law, start, &BUDGET);
     // Friction that creeps by ever smaller slips: rounding decides how far the multiplier is from 1.
     let creeps = |[modulus, _]: [f64; 2]| (modulus - 1.0).abs() < CREEP;
-    if !case.oscillator.friction.is_empty() && measured.multiplier.is_some_and(creeps) {
+    if !case.machine.friction.is_empty() && measured.multiplier.is_some_and(creeps) {
         return found(Agreement::NoCycle, [0.0; 2]);
     }
-    let ours = settle(&system, &whole.start, MOST_PERIODS);
-    let of_period =
-        |period| (period, analyse_flow(&flow, case.law, case.start, &BUDGET.settings, EVENT_PERIODS));
+    let ours = settle(&system, &case.start, MOST_PERIODS);
+    let of_period = |period| (period, analyse_flow(&flow, law, start, &BUDGET.settings, EVENT_PERIODS));
     let theirs = measured.period.map(of_period);
     if let (Some(ours), Some((_, orbit))) = (&ours, &theirs)
         && let Ok(off) = same_cycle(case, ours, &measured, orbit)
@@ -135,7 +134,7 @@ fn compare(case: &Case) -> Result<Compared, String> {
     let Some((period, orbit)) = theirs.filter(|(_, orbit)| !decides(orbit.status)) else {
         return found(Agreement::NoCycle, [0.0; 2]);
     };
-    let start = Motion::new(&system, &orbit.strobe[..whole.start.len()]);
+    let start = Motion::new(&system, &orbit.strobe[..case.start.len()]);
     let followed = follow(&start, period as usize).ok_or("the reference's cycle does not end")?;
     if followed.noise > MOST_NOISE {
         return found(Agreement::NoCycle, [0.0; 2]);
@@ -219,7 +218,7 @@ const WIDE: Shape = Shape { harmonics: true, stages: true, wide: true, ..PLAIN }
 fn wide(shape: Shape) -> impl Fn(u64) -> (Form, Law, State) {
     move |seed| {
         let case = case(seed, shape);
-        (case.oscillator.form(case.law), case.law, case.start)
+        (Form::from(&case.machine), case.machine.law(), state(&case.start))
     }
 }
 
@@ -274,11 +273,4 @@ fn ten_thousand_wide_models_end_with_finite_numbers() {
 #[ignore = "minutes"]
 fn ten_thousand_machines_end_with_finite_numbers() {
     check_ends(machine, 0..10_000, LONGEST_TIME);
-}
-
-/// Slow forces drive some of these motions through thousands of contacts in each period.
-#[test]
-#[ignore = "minutes"]
-fn a_thousand_wide_models_with_pushing_walls_end_with_finite_numbers() {
-    check_ends(wide(Shape { pushing: true, ..WIDE }), 0..1000, 10 * LONGEST_TIME);
 }

@@ -36,12 +36,12 @@ fn machines_have_the_classes_of_their_oscillators() {
     let of = |seed: u64| {
         let shape = Shape { stages: seed % 2 == 1, friction: seed.is_multiple_of(3), ..PLAIN };
         let case = case(seed, shape);
-        let machine = Form::Machine(case.oscillator.described(case.law));
-        let [flow, whole] = [case.oscillator.form(case.law), machine].map(Flow::new);
+        let (law, start) = (case.machine.law(), state(&case.start));
+        let [flow, whole] = [Form::from(&case.machine), Form::Machine(case.machine)].map(Flow::new);
         let settings = Settings { transient_periods: 200, observed_periods: 64, max_period: 16 };
         let [expected, found] =
-            [&flow, &whole].map(|flow| analyse_flow(flow, case.law, case.start, &settings, EVENT_PERIODS));
-        let measured = measure(&whole, case.law, case.start, &BUDGET);
+            [&flow, &whole].map(|flow| analyse_flow(flow, law, start, &settings, EVENT_PERIODS));
+        let measured = measure(&whole, law, start, &BUDGET);
         let Class::Periodic { period } = expected.class else {
             return (
                 expected.class == found.class,

@@ -202,7 +202,6 @@ pub(crate) fn in_units(
         damping: d.damping.map(|row| row.map(|c| rate * c)),
         stiffness: d.stiffness.map(|row| row.map(|k| rate * rate * k)),
         load: d.load.map(|f| force * f),
-        preload: 0.0,
     };
     let scaled = Pair {
         walls: oscillator.walls.map(|wall| length * wall),
@@ -276,8 +275,7 @@ fn a_unit_of_time_that_is_a_power_of_two_changes_no_class() {
 /// Two equal pendulums lose their relative motion in impacts, and then swing together for ever. Nothing in this model has a length.
 #[test]
 fn equal_pendulums_that_collide_end_in_a_common_swing() {
-    let free =
-        Domain { damping: [[0.0; 2]; 2], stiffness: [[1.0, 0.0], [0.0, 1.0]], load: [0.0; 2], preload: 0.0 };
+    let free = Domain { damping: [[0.0; 2]; 2], stiffness: [[1.0, 0.0], [0.0, 1.0]], load: [0.0; 2] };
     let pendulums = Pair { gap: [1.0, -1.0], ..unforced(2, free) };
     let flow = Flow::new(&with_wall(pendulums, Side::Right, 0.0, Contact::Rigid, [0.0; 2]));
     for e in [0.0, 0.3, 0.5, 0.8] {

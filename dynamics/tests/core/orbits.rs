@@ -304,8 +304,7 @@ fn a_symmetric_cycle_with_strobes_in_different_domains_is_found() {
 /// Two equal pendulums, one of which is driven off its resonance, collide for ever.
 #[test]
 fn an_undecided_motion_ends_within_10_000_periods() {
-    let free =
-        Domain { damping: [[0.0; 2]; 2], stiffness: [[1.0, 0.0], [0.0, 1.0]], load: [0.0; 2], preload: 0.0 };
+    let free = Domain { damping: [[0.0; 2]; 2], stiffness: [[1.0, 0.0], [0.0, 1.0]], load: [0.0; 2] };
     let pendulums = Pair { gap: [1.0, -1.0], omega: 0.7, force: [0.1, 0.0], ..unforced(2, free) };
     let flow = Flow::new(&with_wall(pendulums, Side::Right, 0.0, Contact::Rigid, [0.0; 2]));
     let orbit = analyse_flow(&flow, Law::both(0.3, 0.0), state(&[1.0]), &Settings::default(), 8);

@@ -1,19 +1,18 @@
 //! Elastic walls that only push, and walls with a preload.
 
-use crate::common::linear::{Linear, with_preload, with_wall};
+use crate::common::linear::{Linear, with_law, with_wall};
 use crate::common::near;
 use crate::common::pairs::described;
-use rattlemap_dynamics::model::{Contact, Law, Pair, REST, Side, state};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{EventKind, GapEvent, Stop, Trajectory};
-use rattlemap_dynamics::orbit::{Class, Settings, analyse_flow};
 
 const LAW: Law = Law { restitution: [0.5; 2], mesh_speed: [0.01; 2] };
 
-fn both_walls(free: Linear, at: f64, contact: Contact, spring: [f64; 2]) -> Pair {
-    Side::BOTH
-        .into_iter()
-        .fold(free.oscillator(), |o, side| with_wall(o, side, side.sign() * at, contact, spring))
+fn both_walls(free: Linear, at: f64, contact: Contact, spring: [f64; 2], preload: Option<f64>) -> Oscillator {
+    let wall = |o, side: Side| with_wall(o, side, side.sign() * at, Contact::Elastic, spring);
+    let walled = described(&Side::BOTH.into_iter().fold(free.oscillator(), wall), LAW);
+    Side::BOTH.into_iter().fold(walled, |o, side| with_law(o, side, contact, preload))
 }
 
 /// An inertia of 5 kg m^2 behind a backlash of 45 degrees with a spring and a damper, released at 90 degrees, as in the Modelica library's
@@ -24,9 +23,8 @@ fn backlash_that_does_not_pull_has_the_published_trace() {
     for (contact, expected) in
         [(Contact::Pushing, [0.10348, -6.21340]), (Contact::Elastic, [0.36518, -5.41207])]
     {
-        let oscillator =
-            both_walls(still, std::f64::consts::FRAC_PI_8, contact, [20_000.0 / 5.0, 50.0 / 5.0]);
-        let flow = Flow::new(&oscillator);
+        let spring = [20_000.0 / 5.0, 50.0 / 5.0];
+        let flow = Flow::new(&both_walls(still, std::f64::consts::FRAC_PI_8, contact, spring, None));
         let mut trajectory = Trajectory::<0>::new(&flow, LAW, state(&[std::f64::consts::FRAC_PI_2]));
         trajectory.advance_period(&mut ()).unwrap();
         let [x, v, ..] = trajectory.state();
@@ -40,9 +38,7 @@ fn backlash_that_does_not_pull_has_the_published_trace() {
 fn a_constant_force_returns_the_mass_with_its_speed() {
     let still = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega: 0.25 };
     for contact in [Contact::Elastic, Contact::Pushing] {
-        let walled = both_walls(still, 0.5, contact, [0.0, 0.0]);
-        let oscillator = Side::BOTH.into_iter().fold(walled, |o, side| with_preload(o, side, 4.0));
-        let flow = Flow::new(&oscillator);
+        let flow = Flow::new(&both_walls(still, 0.5, contact, [0.0, 0.0], Some(4.0)));
         let mut events: Vec<GapEvent> = Vec::new();
         let units = [state(&[1.0]), state(&[0.0, 1.0])];
         let mut trajectory = Trajectory::with_tangents(&flow, LAW, state(&[0.0, 3.0]), units);
@@ -81,9 +77,9 @@ fn a_constant_force_returns_the_mass_with_its_speed() {
 fn rest_under_a_load_below_the_preload_ends() {
     let pressed = Linear { gamma: 0.1, square: 0.0, force: 0.0, load: 1.0, omega: 1.0 };
     for contact in [Contact::Elastic, Contact::Pushing] {
-        let walled = with_wall(pressed.oscillator(), Side::Right, 0.5, contact, [10.0, 1.0]);
+        let walled = with_wall(pressed.oscillator(), Side::Right, 0.5, Contact::Elastic, [10.0, 1.0]);
         let end = |preload: f64, start: f64| {
-            let flow = Flow::new(&with_preload(walled.clone(), Side::Right, preload));
+            let flow = Flow::new(&with_law(described(&walled, LAW), Side::Right, contact, Some(preload)));
             let mut trajectory = Trajectory::<0>::new(&flow, LAW, state(&[start]));
             (0..20).try_for_each(|_| trajectory.advance_period(&mut ())).map(|()| trajectory.state()[0])
         };
@@ -96,30 +92,13 @@ fn rest_under_a_load_below_the_preload_ends() {
     }
 }
 
-/// Without a damper and a preload a wall never pulls.
-#[test]
-fn a_spring_alone_never_pulls() {
-    let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
-    let orbit = |contact| {
-        let oscillator = with_wall(free.oscillator(), Side::Right, 0.2, contact, [8.0, 0.0]);
-        analyse_flow(&Flow::new(&oscillator), LAW, REST, &Settings::default(), 8)
-    };
-    let [elastic, mut pushing] = [orbit(Contact::Elastic), orbit(Contact::Pushing)];
-    // When contact ends, the spring holds no energy.
-    let released = pushing.quantities.as_mut().and_then(|quantities| quantities.release_energy.take());
-    assert_eq!(released, Some(0.0));
-    assert_eq!(elastic.class, Class::Periodic { period: 1 });
-    assert_eq!(format!("{elastic:?}"), format!("{pushing:?}"));
-}
-
 /// A preload belongs to elastic walls, and only the last wall of a side may be one that only pushes.
 #[test]
 fn preloads_of_other_walls_are_refused() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 1.5 };
     let message = |contact: Contact, preload: f64| {
         let pair = with_wall(free.oscillator(), Side::Right, 0.2, contact, [8.0, 0.0]);
-        let mut oscillator = described(&pair, Law::both(0.0, 0.0));
-        oscillator.gaps[0].walls[0][0].springs[0].preload = preload;
+        let oscillator = with_law(described(&pair, LAW), Side::Right, contact, Some(preload));
         oscillator.validate().map_err(|error| error.to_string())
     };
     assert_eq!(message(Contact::Elastic, 1.0), Ok(()));

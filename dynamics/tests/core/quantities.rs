@@ -1,7 +1,7 @@
 //! Measured quantities: energy balance, closed forms, and dense samples of the same motion.
 
-use crate::common::linear::{Linear, with_preload, with_wall};
-use crate::common::pairs::OfPair;
+use crate::common::linear::{Linear, with_law, with_wall};
+use crate::common::pairs::{OfPair, described};
 use crate::common::{BUDGET, REST, near, paper};
 use rattlemap_dynamics::model::{Contact, GearPair, Law, Pair, Side, State, state};
 use rattlemap_dynamics::motion::Flow;
@@ -142,33 +142,32 @@ fn a_bouncing_ball_has_the_impulses_of_its_cycle() {
 fn compliant_and_rigid_contacts_close_the_balance() {
     let free = Linear { gamma: 0.05, square: 1.0, force: 1.0, load: 0.0, omega: 2.1 };
     let elastic = with_wall(free.oscillator(), Side::Right, 0.1, Contact::Elastic, [24.0, 1.5]);
-    let pushing = Pair { contacts: [Contact::Pushing; 2], ..elastic.clone() };
-    let loose = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -0.2) };
-    let tight = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, 0.1) };
-    let pulled = Pair { contacts: [Contact::Pushing; 2], ..with_preload(elastic.clone(), Side::Right, -2.0) };
+    let of = |pair: &Pair, contact: Contact, preload: Option<f64>| {
+        with_law(described(pair, Law::both(0.5, 0.0)), Side::Right, contact, preload)
+    };
     let table = Linear { gamma: 0.0, square: 0.0, force: 1.2, load: 1.0, omega: 1.0 };
     let rigid = with_wall(table.oscillator(), Side::Right, 0.0, Contact::Rigid, [0.0, 0.0]);
     let mut released = Vec::new();
-    for (oscillator, law, start) in [
-        (elastic.clone(), Law::both(0.5, 0.0), REST),
-        (with_preload(elastic, Side::Right, 0.1), Law::both(0.5, 0.0), REST),
-        (pushing, Law::both(0.5, 0.0), REST),
-        (loose, Law::both(0.5, 0.0), REST),
-        (tight, Law::both(0.5, 0.0), REST),
-        (pulled, Law::both(0.5, 0.0), REST),
-        (rigid.clone(), Law::both(0.0, 0.0), REST),
-        (rigid, Law::both(0.4, 0.0), REST),
+    for oscillator in [
+        of(&elastic, Contact::Elastic, None),
+        of(&elastic, Contact::Elastic, Some(0.1)),
+        of(&elastic, Contact::Pushing, None),
+        of(&elastic, Contact::Pushing, Some(-0.2)),
+        of(&elastic, Contact::Pushing, Some(0.1)),
+        of(&elastic, Contact::Pushing, Some(-2.0)),
+        described(&rigid, Law::both(0.0, 0.0)),
+        described(&rigid, Law::both(0.4, 0.0)),
     ] {
-        let flow = Flow::new(&oscillator);
-        let orbit = analyse_flow(&flow, law, start, &Settings::default(), 8);
+        let (flow, law) = (Flow::new(&oscillator), oscillator.law());
+        let orbit = analyse_flow(&flow, law, REST, &Settings::default(), 8);
         let of = quantities(&orbit);
         assert!(matches!(orbit.class, Class::Periodic { .. }), "{orbit:?}");
-        let work = power(oscillator.force[0], oscillator.omega, of.displacements[0].harmonic);
+        let work = power(oscillator.drives[0].cos[0], oscillator.omega, of.displacements[0].harmonic);
         let lost = of.dissipated + of.impact_energy + of.release_energy.unwrap_or(0.0);
         assert!(near(work, lost, 1e-10 * work.abs()), "{work} {of:?}");
         released.extend(of.release_energy);
-        let (is_elastic, wall) = (oscillator.contacts[0].is_elastic(), &oscillator.meshing[0]);
-        assert_eq!(of.contact_force.is_some(), is_elastic, "{of:?}");
+        let wall = &oscillator.gaps[0].walls[0][0];
+        assert_eq!(of.contact_force.is_some(), wall.contact.is_elastic(), "{of:?}");
         if let Some([largest, rms]) = of.contact_force {
             let samples = 100_000;
             let orbit_samples = {
@@ -180,7 +179,9 @@ fn compliant_and_rigid_contacts_close_the_balance() {
                             .advance_to(flow.period * f64::from(i) / f64::from(samples), &mut ())
                             .unwrap();
                         let [x, v, ..] = trajectory.state();
-                        trajectory.meshing().map(|_| 24.0 * (x - 0.1) + 1.5 * v + wall.preload)
+                        trajectory
+                            .meshing()
+                            .map(|_| 24.0 * (x - 0.1) + 1.5 * v + wall.springs[0].force_at_wall())
                     })
                     .collect::<Vec<f64>>()
             };

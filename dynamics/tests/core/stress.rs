@@ -101,7 +101,6 @@ fn an_escape_within_a_long_period_takes_bounded_work() {
         damping: [[1.0, 0.0], [0.0, 8.0]],
         stiffness: [[-15.0, 0.0], [0.0, 500.0]],
         load: [0.0, 1.0],
-        preload: 0.0,
     };
     let oscillator = Pair {
         degrees: 2,

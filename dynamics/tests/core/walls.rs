@@ -4,27 +4,29 @@ use crate::common::linear::{Linear, with_wall};
 use crate::common::near;
 use crate::common::pairs::described;
 use crate::independent::random::{PLAIN, Shape, case};
-use rattlemap_dynamics::model::{Contact, Law, OscillatorError, OuterWall, Pair, Side, state};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, OscillatorError, Side, Spring, Wall, state};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::motion::{EventKind, GapEvent, Trajectory};
 use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, Settings, Status, analyse_flow};
 
-/// Adds a wall behind the outermost one of a side, with a spring along the gap.
-fn add(o: &mut Pair, side: Side, at: f64, contact: Contact, stiffness: f64) {
-    let i = side.index();
-    let inside = o.outer_walls[i].last().map_or(o.meshing[i], |wall| wall.meshing[0]);
-    let behind =
-        with_wall(Pair { free: inside, ..o.clone() }, side, at, contact, [stiffness, 0.0]).meshing[i];
-    o.outer_walls[i].push(OuterWall { at, contact, meshing: vec![behind] });
+/// Adds an elastic wall behind the outermost one of a side.
+fn add(o: &mut Oscillator, side: Side, at: f64, stiffness: f64) {
+    let walls = &mut o.gaps[0].walls[side.index()];
+    let springs = vec![Spring { stiffness, damping: 0.0, preload: None }];
+    walls.push(Wall { at, springs, ..walls[0].clone() });
 }
 
-/// A unit mass that moves freely between springs of stiffness 4 at 1 and -1, and more springs of 12 at 2 and -2.
-fn two_stages(omega: f64) -> Pair {
-    let mut o = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega }.oscillator();
-    for side in Side::BOTH {
-        o = with_wall(o, side, side.sign(), Contact::Elastic, [4.0, 0.0]);
-        add(&mut o, side, 2.0 * side.sign(), Contact::Elastic, 12.0);
-    }
+/// A unit mass that moves freely between springs of stiffness 4 at 1 and -1.
+fn one_stage(omega: f64) -> Oscillator {
+    let free = Linear { gamma: 0.0, square: 0.0, force: 0.0, load: 0.0, omega }.oscillator();
+    let wall = |o, side: Side| with_wall(o, side, side.sign(), Contact::Elastic, [4.0, 0.0]);
+    described(&Side::BOTH.into_iter().fold(free, wall), Law::both(0.0, 0.0))
+}
+
+/// With more springs of 12 at 2 and -2.
+fn two_stages(omega: f64) -> Oscillator {
+    let mut o = one_stage(omega);
+    Side::BOTH.into_iter().for_each(|side| add(&mut o, side, 2.0 * side.sign(), 12.0));
     o
 }
 
@@ -76,21 +78,20 @@ fn energy_balances_with_several_walls() {
     let mut cycles = 0;
     for seed in 300..400 {
         let case = case(seed, shape);
-        let flow = Flow::new(&case.oscillator.pair);
-        let orbit = analyse_flow(&flow, case.law, case.start, &Settings::default(), EVENT_PERIODS);
+        let (o, flow) = (&case.machine, Flow::new(&case.machine));
+        let orbit = analyse_flow(&flow, o.law(), state(&case.start), &Settings::default(), EVENT_PERIODS);
         let (Class::Periodic { .. }, Status::Ok) = (orbit.class, orbit.status) else { continue };
         let of = orbit.quantities.unwrap();
-        let o = &case.oscillator;
         let power = |i: usize| {
             let [size, phase] = of.displacements[i].harmonic;
-            let factors = [o.force[i], o.force_sin[i]].map(|force| 0.5 * o.omega * size * force);
+            let factors = [&o.drives[0].cos, &o.drives[0].sin].map(|force| 0.5 * o.omega * size * force[i]);
             [-factors[0] * phase.sin() - factors[1] * phase.cos(), factors[0].abs() + factors[1].abs()]
         };
         // Harmonics of small motion have the rounding error of the mean displacement.
-        let [work, terms] = [0, 1].map(|part| power(0)[part] + power(1)[part]);
+        let [work, terms] = [0, 1].map(|part| (0..o.degrees()).map(|i| power(i)[part]).sum::<f64>());
         let taken = of.dissipated + of.impact_energy;
         assert!(near(work, taken, 1e-10 * taken + 1e-12 * terms), "{seed}: {work} {taken} {terms}");
-        cycles += usize::from(case.oscillator.has_outer_walls());
+        cycles += usize::from(o.needs_machine().is_some());
     }
     assert!(cycles > 60, "{cycles}");
 }
@@ -99,13 +100,11 @@ fn energy_balances_with_several_walls() {
 #[test]
 fn a_wall_without_a_spring_changes_no_motion() {
     for at in [1.2, 1.7, 2.5] {
-        let mut o = two_stages(2.0);
-        o.outer_walls = Default::default();
-        o.force = [6.0, 0.0];
-        o.free.damping[0][0] = 0.3;
-        o.meshing.iter_mut().for_each(|behind| behind.damping[0][0] = 0.3);
+        let mut o = one_stage(2.0);
+        o.drives[0].cos[0] = 6.0;
+        o.stages[0].damping[(0, 0)] = 0.3;
         let plain = Flow::new(&o);
-        add(&mut o, Side::Right, at, Contact::Elastic, 0.0);
+        add(&mut o, Side::Right, at, 0.0);
         let more = Flow::new(&o);
         let start = state(&[0.2]);
         let [mut a, mut b] =
@@ -128,21 +127,18 @@ fn a_wall_without_a_spring_changes_no_motion() {
 
 #[test]
 fn walls_in_a_wrong_order_are_refused() {
-    let message = |change: &dyn Fn(&mut Pair)| {
+    let message = |change: &dyn Fn(&mut [Vec<Wall>; 2])| {
         let mut o = two_stages(1.0);
-        change(&mut o);
-        described(&o, Law::both(0.0, 0.0))
-            .validate()
-            .err()
-            .as_ref()
-            .map(OscillatorError::to_string)
-            .unwrap_or_default()
+        change(&mut o.gaps[0].walls);
+        o.validate().err().as_ref().map(OscillatorError::to_string).unwrap_or_default()
     };
     assert_eq!(message(&|_| ()), "");
-    let near = message(&|o| o.outer_walls[0][0].at = 0.5);
+    let near = message(&|walls| walls[0][1].at = 0.5);
     assert!(near.starts_with("position of right wall 2 = 0.5: it must be farther out"), "{near}");
-    let rigid = message(&|o| o.contacts[1] = Contact::Rigid);
+    let rigid = message(&|walls| walls[1][0].contact = Contact::Rigid);
     assert!(rigid.starts_with("left wall 1 = -1: it must be elastic"), "{rigid}");
-    let many = message(&|o| (3..7).for_each(|at| add(o, Side::Right, f64::from(at), Contact::Elastic, 1.0)));
+    let many = message(&|walls| {
+        (3..6).for_each(|at| walls[0].push(Wall { at: f64::from(at), ..walls[0][1].clone() }));
+    });
     assert!(many.contains("at most 4"), "{many}");
 }

@@ -4,7 +4,6 @@ use bytemuck::Zeroable;
 use wide::f64x4;
 
 use super::coordinates::Coordinates;
-use super::pushing::{closed_pages, open_page, push};
 use crate::gpu::layout::{Domain, Flow};
 use crate::record::limits::MOST_STEPS;
 use rattlemap_dynamics::model::{self, Contact, Pair, Side};
@@ -29,37 +28,25 @@ pub(in crate::gpu) struct Change {
     /// Free steps since phase 0: whole ones, and the fraction of the next one.
     pub(in crate::gpu) step: u32,
     pub(in crate::gpu) theta: f64,
-    /// Page of the interval between the first walls, in the stage that begins.
-    pub(in crate::gpu) page: usize,
-}
-
-/// Further constants that the shader reads for one stage and one interval between walls.
-#[derive(Clone, Debug)]
-pub(in crate::gpu) struct Page {
-    /// The higher harmonics, [`PAIRS_PER_HARMONIC`] for each.
-    pub(in crate::gpu) harmonics: Vec<[f64; 2]>,
-    /// Kinds of the right and of the left wall.
-    pub(in crate::gpu) contacts: [Contact; 2],
-    /// Pages of the intervals behind the right and behind the left wall, in the same stage.
-    pub(in crate::gpu) behind: [Option<usize>; 2],
+    /// The stage that begins.
+    pub(in crate::gpu) stage: usize,
 }
 
 /// Constants of one pair.
 #[derive(Clone, Debug)]
 pub struct PairConstants {
-    /// Constants that the shader reads in the first stage between the first walls, apart from those in `page`.
+    /// Constants that the shader reads in the first stage, apart from those of the higher harmonics.
     pub flow: Flow,
-    /// The rest of these constants.
-    pub(in crate::gpu) page: Page,
-    /// The intervals behind the first walls, from the inside to the outside, right ones first; then all intervals of the
-    /// further stages. `flow` and `page` have number 0.
-    pub(in crate::gpu) further: Vec<(Flow, Page)>,
+    /// The higher harmonics in the first stage, [`PAIRS_PER_HARMONIC`] for each.
+    pub(in crate::gpu) harmonics: Vec<[f64; 2]>,
+    /// The same constants in the further stages.
+    pub(in crate::gpu) further: Vec<(Flow, Vec<[f64; 2]>)>,
+    /// Kinds of the right and of the left wall.
+    pub(in crate::gpu) contacts: [Contact; 2],
     /// Changes of the stage; none if there is only one stage.
     pub(in crate::gpu) changes: Vec<Change>,
     /// Whether contact-free motion also requires that the displacement `x` rests at 0.
     pub(in crate::gpu) must_rest: bool,
-    /// Whether a wall only pushes.
-    pub(in crate::gpu) has_pushing_walls: bool,
     /// Positions of the rigid walls on the right and on the left; infinite on a side without a rigid wall.
     bounds: [f64; 2],
     coordinates: Coordinates,
@@ -69,13 +56,7 @@ impl PairConstants {
     /// Returns the free steps per forcing period: `requested`, or as many as the motion needs. Returns `None` if
     /// there are too many for a lane.
     pub(in crate::gpu) fn steps(oscillator: &Pair, requested: Option<u32>) -> Option<u32> {
-        let oscillator = &*closed_pages(oscillator);
-        let of_stages = oscillator.stages.iter().map(|stage| &stage.free);
-        let passed = Side::BOTH.into_iter().flat_map(|side| {
-            let inner = oscillator.outer_walls[side.index()].len();
-            (0..inner).flat_map(move |nth| behind_nth_wall(oscillator, side, nth))
-        });
-        let rates = of_stages.chain(passed).map(|free| rate(oscillator, free));
+        let rates = oscillator.stages.iter().map(|stage| rate(oscillator, &stage.free));
         let angle = oscillator.period() * rates.fold(rate(oscillator, &oscillator.free), f64::max);
         let needed = (angle / STEP_ANGLE).ceil().max(8.0);
         // An even number, so that half a period is a whole number of steps.
@@ -85,32 +66,20 @@ impl PairConstants {
 
     /// Derives the constants for a number of steps.
     pub(in crate::gpu) fn new(oscillator: &Pair, steps: u32) -> Option<PairConstants> {
-        let whole = closed_pages(oscillator);
-        let (model, oscillator) = (oscillator, &*whole);
         let period = oscillator.period();
         let common = Common::new(oscillator, period / f64::from(steps));
         let coordinates = Coordinates::new(oscillator);
-        let mut pages = pages_of_stage(oscillator, model, &common, 0);
-        let intervals = pages.len();
-        let mut changes = Vec::new();
-        if !oscillator.schedule.is_empty() {
-            let further = 1..oscillator.stage_count();
-            pages.extend(further.flat_map(|stage| {
-                pages_of_stage(&oscillator.in_stage(stage), model, &common, stage * intervals)
-            }));
-            changes = changes_of(oscillator, steps, intervals);
-        }
-        let further = pages.split_off(1);
-        let (flow, page) = pages.pop()?;
+        let (flow, harmonics) = of_stage(oscillator, &common);
+        let further = if oscillator.schedule.is_empty() { 1..1 } else { 1..oscillator.stage_count() };
         let mut constants = PairConstants {
             flow,
-            page,
-            further,
-            changes,
+            harmonics,
+            further: further.map(|stage| of_stage(&oscillator.in_stage(stage), &common)).collect(),
+            contacts: oscillator.contacts,
+            changes: changes_of(oscillator, steps),
             must_rest: false,
-            has_pushing_walls: model.has_pushing_walls(),
-            bounds: Side::BOTH.map(|side| match oscillator.last_wall(side) {
-                (at, Contact::Rigid) => at,
+            bounds: Side::BOTH.map(|side| match oscillator.contacts[side.index()] {
+                Contact::Rigid => oscillator.walls[side.index()],
                 _ => side.sign() * f64::INFINITY,
             }),
             coordinates,
@@ -149,16 +118,14 @@ impl PairConstants {
     }
 }
 
-/// Constants that all stages have in common, in one interval between walls.
+/// Constants that all stages have in common.
 #[derive(Clone, Copy)]
 struct Common {
     /// Length of a free step.
     h: f64,
-    /// Steps of contact with the last wall of each side per free step.
+    /// Steps of contact with each wall per free step.
     substeps: [f64; 2],
     walls: [f64; 2],
-    /// Whether motion that reaches the wall enters another interval.
-    is_passed: [bool; 2],
     /// Scale of length.
     length: f64,
     /// Unit of speeds.
@@ -170,18 +137,18 @@ impl Common {
     fn new(oscillator: &Pair, h: f64) -> Common {
         let substeps = |side: Side| {
             // A gap at rest on a rigid wall moves with free steps.
-            if oscillator.last_wall(side).1 == Contact::Rigid {
+            let i = side.index();
+            if oscillator.contacts[i] == Contact::Rigid {
                 return 1.0;
             }
-            let outer = oscillator.outer_walls[side.index()].len();
-            let rates = behind_nth_wall(oscillator, side, outer).map(|behind| rate(oscillator, behind));
+            let stages = (0..oscillator.stage_count()).map(|stage| oscillator.stage(stage).meshing[i]);
+            let rates = stages.map(|behind| rate(oscillator, &behind));
             (h * rates.fold(0.0, f64::max) / STEP_ANGLE).max(1.0).log2().ceil().exp2()
         };
         Common {
             h,
             substeps: Side::BOTH.map(substeps),
             walls: walls(oscillator),
-            is_passed: oscillator.outer_walls.each_ref().map(|walls| !walls.is_empty()),
             length: oscillator.length_scale(),
             speed: speed(oscillator),
             escape: Some(oscillator.escape()).filter(|size| size.is_finite()).unwrap_or(-1.0),
@@ -189,15 +156,8 @@ impl Common {
     }
 
     fn domains(&self, oscillator: &Pair) -> [Domain; 3] {
-        let behind = |side: usize| match self.is_passed[side] {
-            // Motion never enters this domain. It stores the step of contact with the last wall, in which the time of that contact is
-            // counted.
-            true => {
-                let substeps = self.substeps[side];
-                Domain { share: substeps.recip(), substeps, ..Domain::zeroed() }
-            }
-            false => behind_wall(oscillator, side, self.walls[side], self.h, self.substeps[side]),
-        };
+        let behind =
+            |side: usize| behind_wall(oscillator, side, self.walls[side], self.h, self.substeps[side]);
         let right = behind(0);
         // Without stages, only this stage counts.
         let is_mirrored = oscillator.schedule.is_empty() && oscillator.mirror_symmetric();
@@ -211,60 +171,8 @@ impl Common {
     }
 }
 
-/// Returns the domains of contact with the `nth` wall of a side in all stages; `nth` counts from 0.
-fn behind_nth_wall(oscillator: &Pair, side: Side, nth: usize) -> impl Iterator<Item = &model::Domain> {
-    let i = side.index();
-    let first = oscillator.stages.iter().map(move |stage| &stage.meshing[i]).chain([&oscillator.meshing[i]]);
-    let outer = nth.checked_sub(1).map(|nth| &oscillator.outer_walls[i][nth].meshing);
-    first.filter(move |_| nth == 0).chain(outer.into_iter().flatten())
-}
-
-/// Derives the constants of an oscillator's first stage, in all intervals between walls. Pages are numbered from `first`. `model` says
-/// which walls only push.
-fn pages_of_stage(oscillator: &Pair, model: &Pair, common: &Common, first: usize) -> Vec<(Flow, Page)> {
-    let [right, left] = oscillator.outer_walls.each_ref().map(Vec::len);
-    let page = |side: Side, nth: usize| first + nth + if side == Side::Left { right } else { 0 };
-    let behind_first = Side::BOTH.map(|side| common.is_passed[side.index()].then(|| page(side, 1)));
-    let mut pages = vec![page_of(oscillator, common, behind_first)];
-    for (side, count) in Side::BOTH.into_iter().zip([right, left]) {
-        for nth in 1..=count {
-            let interval = oscillator.behind(side, nth);
-            let mut behind = [None; 2];
-            behind[side.index()] = (nth < count).then(|| page(side, nth + 1));
-            behind[1 - side.index()] = Some(if nth == 1 { first } else { page(side, nth - 1) });
-            let is_passed = behind.map(|page| page.is_some());
-            let common = Common { walls: walls(&interval), is_passed, ..*common };
-            let (mut flow, page) = page_of(&interval, &common, behind);
-            flow.held = held_force(oscillator, &interval, common.h);
-            pages.push((flow, page));
-        }
-    }
-    for (side, count) in Side::BOTH.into_iter().zip([right, left]) {
-        if model.last_wall(side).1 != Contact::Pushing {
-            continue;
-        }
-        // Contact with the last wall ends and begins where the wall's force changes its sign.
-        let (closed, before) = (page(side, count), if count == 1 { first } else { page(side, count - 1) });
-        let open = first + pages.len();
-        let (flow, shape) = &mut pages[closed - first];
-        flow.push = push(oscillator, side, common.h);
-        shape.behind[side.index()] = Some(open);
-        let interval = open_page(oscillator, side);
-        let mut behind = [None; 2];
-        (behind[side.index()], behind[1 - side.index()]) = (Some(closed), Some(before));
-        let common = Common { walls: walls(&interval), is_passed: [true; 2], ..*common };
-        let (mut flow, shape) = page_of(&interval, &common, behind);
-        flow.push = push(oscillator, side, common.h).map(|factor| -factor);
-        if count > 1 {
-            flow.held = held_force(oscillator, &interval, common.h);
-        }
-        pages.push((flow, shape));
-    }
-    pages
-}
-
-/// Derives the constants of an oscillator's first stage, between its first walls.
-fn page_of(oscillator: &Pair, common: &Common, pages_behind: [Option<usize>; 2]) -> (Flow, Page) {
+/// Derives the constants of an oscillator's first stage, and those of its higher harmonics.
+fn of_stage(oscillator: &Pair, common: &Common) -> (Flow, Vec<[f64; 2]>) {
     let (h, coordinates) = (common.h, Coordinates::new(oscillator));
     let damper = |behind: &model::Domain| coordinates.damper(&oscillator.free, behind).map(|rate| -h * rate);
     let mut domains = common.domains(oscillator);
@@ -299,12 +207,8 @@ fn page_of(oscillator: &Pair, common: &Common, pages_behind: [Option<usize>; 2])
         damper: oscillator.meshing.each_ref().map(damper),
         springs: Side::BOTH.map(|side| springs(oscillator, side, h)),
         displacements: coordinates.displacements(),
-        held: [0.0; 3],
-        push: [0.0; 3],
-        preload: Side::BOTH.map(|side| coordinates.preload(oscillator, side).map(|rate| -h * h * rate)),
-        unused: [0.0; 2],
     };
-    (flow, Page { harmonics, contacts: oscillator.contacts, behind: pages_behind })
+    (flow, harmonics)
 }
 
 /// Returns the factors of cosine and sine in an acceleration.
@@ -313,12 +217,12 @@ fn factors(row: [f64; 7]) -> [f64; 2] {
 }
 
 /// Returns the changes of the stage in a forcing period.
-fn changes_of(oscillator: &Pair, steps: u32, intervals: usize) -> Vec<Change> {
+fn changes_of(oscillator: &Pair, steps: u32) -> Vec<Change> {
     let change = |&(turns, stage): &(f64, usize)| {
         let position = turns * f64::from(steps);
         // Rounding may give a whole period.
         let step = position.floor().min(f64::from(steps - 1));
-        Change { step: step as u32, theta: position - step, page: stage * intervals }
+        Change { step: step as u32, theta: position - step, stage }
     };
     oscillator.schedule.iter().map(change).collect()
 }
@@ -437,13 +341,6 @@ fn springs(oscillator: &Pair, side: Side, h: f64) -> [f64; 2] {
     let [stiffness, damping] = oscillator.wall_stiffness_and_damping(side);
     let compliance = Coordinates::new(oscillator).compliance();
     [stiffness * compliance * h * h, damping * compliance * h]
-}
-
-/// Returns the force of the walls that the gap has passed, in the units of [`springs`]: factors of gap and rate, and a constant.
-fn held_force(oscillator: &Pair, interval: &Pair, h: f64) -> [f64; 3] {
-    let [stiffness, damping, constant] = interval.force_against(&oscillator.free);
-    let compliance = Coordinates::new(oscillator).compliance();
-    [stiffness * compliance * h * h, damping * compliance * h, constant * compliance * h * h]
 }
 
 /// Returns the domain of the other displacement while the gap sticks to a rigid wall. The wall's force cancels the gap's acceleration, and

@@ -1,6 +1,6 @@
 //! Oscillators in the coordinates of lanes: the gap `z` and one displacement `x`.
 
-use rattlemap_dynamics::model::{Domain, Pair, REST, Side, State};
+use rattlemap_dynamics::model::{Domain, Pair, REST, State};
 
 /// Choice of the displacement `x`, and the effect of a force along the gap.
 #[derive(Clone, Copy, Debug)]
@@ -149,12 +149,6 @@ impl Coordinates {
         let [[_, d], [e, _]] = domain.damping;
         let gyroscopic = (0.5 * (d - e)).abs() * a * c;
         (norm(domain.dissipation()) + gyroscopic, norm(domain.stiffness).sqrt())
-    }
-
-    /// Returns the decrease of the accelerations of gap and `x` by the preload of a wall.
-    pub(super) fn preload(&self, oscillator: &Pair, side: Side) -> [f64; 2] {
-        let push = side.sign() * oscillator.preload(side);
-        [push * self.compliance(), push * self.accelerated(self.gap)[self.other]]
     }
 
     /// Returns the change of the accelerations of the gap and of `x`, per unit of gap rate, by a damper along the gap

@@ -580,8 +580,7 @@ fn survey_flows<T: Send>(
     (0..plan.flow_count() as u32).into_par_iter().map(move |flow| {
         let form = plan.form(flow);
         let follows_chatter = |pair: &Pair, side: Side| {
-            let (wall, contact) = pair.last_wall(side);
-            let bounces = wall.is_finite() && !contact.is_elastic();
+            let bounces = pair.walls[side.index()].is_finite() && !pair.contacts[side.index()].is_elastic();
             bounces && gpu::follows_chatter(pair, least[side.index()])
         };
         let chatter = match &form {

@@ -35,17 +35,11 @@ fn mass(load: f64, walls: [f64; 2], contact: Contact) -> Pair {
         harmonics: Vec::new(),
         stages: Vec::new(),
         schedule: Vec::new(),
-        outer_walls: Default::default(),
     }
 }
 
 fn domain(stiffness: f64, load: f64) -> Domain {
-    Domain {
-        damping: [[0.0; 2]; 2],
-        stiffness: [[stiffness, 0.0], [0.0, 0.0]],
-        load: [load, 0.0],
-        preload: 0.0,
-    }
+    Domain { damping: [[0.0; 2]; 2], stiffness: [[stiffness, 0.0], [0.0, 0.0]], load: [load, 0.0] }
 }
 
 fn stage(stiffness: f64, load: f64) -> Stage {
@@ -75,12 +69,8 @@ fn assert_near(ours: &[f64], exact: &[f64], within: f64, what: &str) {
 /// The steady response to each harmonic solves `(K - w^2 M + i w C) X = cos - i sin` with `w = order omega`.
 #[test]
 fn the_response_to_three_harmonics_is_that_of_the_closed_form() {
-    let free = Domain {
-        damping: [[1.1, -0.3], [-0.3, 0.8]],
-        stiffness: [[9.0, -2.0], [-2.0, 5.0]],
-        load: [0.0; 2],
-        preload: 0.0,
-    };
+    let free =
+        Domain { damping: [[1.1, -0.3], [-0.3, 0.8]], stiffness: [[9.0, -2.0], [-2.0, 5.0]], load: [0.0; 2] };
     let further = |order, cos, sin| Harmonic { order, cos, sin };
     let oscillator = Pair {
         degrees: 2,

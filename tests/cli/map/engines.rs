@@ -127,19 +127,3 @@ fn an_environment_that_leaves_no_adapter_is_named() {
         .success()
         .stdout(says(&["WGPU_BACKEND=foo", "auto chooses cpu"]));
 }
-
-/// Software drivers serve as graphics device here.
-#[test]
-fn graphics_devices_refuse_a_negative_preload_and_name_the_processor() {
-    let folder = with(
-        "model = 'm.toml'\n[[axis]]\nparameter = 'T'\nvalues = [100.0, 200.0]\n[[axis]]\nparameter = 'omega'\nvalues = [5.0, 8.0]\n",
-    );
-    let backlash = include_str!("../../../models/backlash.toml");
-    let model = backlash.replace("pull = false", "pull = false\npreload = -1.0");
-    fs::write(folder.path().join("m.toml"), model).unwrap();
-    let parts = [
-        "graphics devices do not compute a wall that only pushes and has a negative preload",
-        "the processor does (--engine cpu)",
-    ];
-    fails(&folder, "map s.toml --engine gpu", 2, &parts);
-}

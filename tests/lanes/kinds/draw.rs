@@ -40,12 +40,8 @@ pub(crate) fn random_cell(seed: u64) -> (Pair, Law, State) {
     let mut gap = [draw.one_of(&[1.0, -1.0]) * draw.between(0.2, 1.5), draw.between(-1.5, 1.5)];
     let mut force = [draw.between(2.0, 8.0), draw.one_of(&[0.0, 1.0]) * draw.between(-3.0, 3.0)];
     let mut load = [0.0; 2].map(|_: f64| draw.one_of(&[0.0, 1.0]) * draw.between(-2.0, 2.0));
-    let free = Domain {
-        damping: first(draw.definite(0.6)),
-        stiffness: first(draw.definite(6.0)),
-        load: [0.0; 2],
-        preload: 0.0,
-    };
+    let free =
+        Domain { damping: first(draw.definite(0.6)), stiffness: first(draw.definite(6.0)), load: [0.0; 2] };
     if degrees == 1 {
         mass = [[mass[0][0], 0.0], [0.0, 1.0]];
         (gap[1], force[1], load[1]) = (0.0, 0.0, 0.0);
@@ -71,7 +67,6 @@ pub(crate) fn random_cell(seed: u64) -> (Pair, Law, State) {
             damping: along(free.damping, c),
             stiffness: along(free.stiffness, k),
             load: [0, 1].map(|i: usize| free.load[i] + k * walls[side] * gap[i]),
-            preload: 0.0,
         }
     });
     let law = Law {

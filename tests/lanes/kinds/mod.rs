@@ -241,7 +241,6 @@ pub(super) fn in_units((oscillator, law, start): &Cell, length: i32, time: i32) 
         damping: scaled(domain.damping, rate),
         stiffness: scaled(domain.stiffness, rate * rate),
         load: domain.load.map(|load| load * size * rate * rate),
-        preload: 0.0,
     };
     let other = Pair {
         walls: oscillator.walls.map(|wall| wall * size),

@@ -178,11 +178,11 @@ impl MachineMotion<'_> {
             self.record(gap, EventKind::MeshStart, side, number, Some(side), observer);
             self.modes.gaps[gap] = GapMode::Beyond(passed + step);
             let spring = wall.springs[self.modes.stage];
-            if closing == 0.0 && spring.preload != 0.0 && !self.heads(gap, side) {
+            if closing == 0.0 && spring.force_at_wall() != 0.0 && !self.heads(gap, side) {
                 // Rest on the wall under a load below the preload is an infinite series of contacts.
                 self.events_in_period = EVENTS_PER_PERIOD_CAP;
             }
-            self.near_grazing |= spring.preload != 0.0 && closing < GRAZING_SPEED * self.system.speed;
+            self.near_grazing |= spring.force_at_wall() != 0.0 && closing < GRAZING_SPEED * self.system.speed;
             self.leave(gap, side.mirrored());
             self.start_from_force(gap, side);
         } else {
@@ -293,7 +293,6 @@ impl MachineMotion<'_> {
             meshing,
             has_impact: !place.contact.is_elastic() && kind != EventKind::MeshEnd && !self.jumps.is_empty(),
             code: of_wall + 4 * kind as u64 + 256 * (gap + 8 * wall) as u64,
-            interval: 0,
             ends_series: false,
         };
         observer.event(&event, &|| [&self.before, &self.point].map(|point| self.unshifted(point)));

@@ -132,7 +132,6 @@ mod tests {
             damping: [[2.0, -0.7], [-0.7, 0.9]],
             stiffness: [[30.0, 4.0], [4.0, 11.0]],
             load: [1.0, -2.0],
-            preload: 0.0,
         };
         let full = Pair { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..pair.clone() };
         let single = Pair { gap: [1.0, 0.0], force: [5.0, 0.0], ..pair.clone() };

@@ -10,8 +10,7 @@ use crate::model::{Domain, Pair};
 /// Energies below this may have lost digits by underflow of the squares.
 const LEAST_ENERGY: f64 = 1e-280;
 
-/// A bound on `|row . y^(n+1)|` over a step, from the energy of `y^(n)` at the start of the step. The row acts on displacements, like the
-/// row of the gap. The bound is scaled to the remainder of a two-point Hermite quintic in Bernstein form.
+/// A bound on `|z^(n+1)|` over a step, from the energy of `y^(n)` at the start of the step. The bound is scaled to the remainder of a two-point Hermite quintic in Bernstein form.
 ///
 /// The quintic through value, slope and curvature at both ends of a step `h` differs from the function by
 /// `u^3 (1-u)^3 h^6 f^(6) / 720`. The factor `u^3 (1-u)^3` is a twentieth of the middle Bernstein polynomial of
@@ -35,15 +34,8 @@ impl EnergyBound {
     }
 
     /// Builds the bound from the energy of `y^(n)`; `term` is `(G unit)^n / n!` and `unit` the Taylor step.
-    pub(super) fn new(
-        oscillator: &Pair,
-        domain: &Domain,
-        row: [f64; 2],
-        term: &Columns,
-        n: u32,
-        unit: f64,
-    ) -> EnergyBound {
-        let reach = oscillator.mobility(row).sqrt();
+    pub(super) fn new(oscillator: &Pair, domain: &Domain, term: &Columns, n: u32, unit: f64) -> EnergyBound {
+        let reach = oscillator.mobility(oscillator.gap).sqrt();
         let scale = reach * unit.powi(6) / 14400.0;
         let [cos, sin] = [oscillator.force, oscillator.force_sin].map(|f| oscillator.mobility(f));
         let drive = (cos + sin).sqrt();
@@ -106,7 +98,7 @@ mod tests {
     fn the_sixth_derivative_of_the_gap_stays_within_its_bound() {
         let good = GearPair::paper(0.5).pair();
         let with = |damping, stiffness| {
-            let free = Domain { damping, stiffness, load: [1.0, -2.0], preload: 0.0 };
+            let free = Domain { damping, stiffness, load: [1.0, -2.0] };
             Pair { mass: [[2.0, 0.6], [0.6, 1.0]], gap: [0.4, -1.3], free, ..good.clone() }
         };
         let passive = [[30.0, 4.0], [4.0, 11.0]];

@@ -104,24 +104,11 @@ impl LinearFlow {
 
     fn in_domain(oscillator: &Pair, domain: &Domain, generator: Generator, rate: f64) -> LinearFlow {
         let bounds = |table: &[Columns], unit: f64| {
-            let bound = |n: u32| {
-                EnergyBound::new(oscillator, domain, oscillator.gap, &table[n as usize - 1], n, unit)
-            };
+            let bound = |n: u32| EnergyBound::new(oscillator, domain, &table[n as usize - 1], n, unit);
             [bound(5), bound(7)]
         };
         let pressing = generator.row(1);
         LinearFlow::assemble(oscillator, generator, rate, pressing, bounds)
-    }
-
-    /// Returns the bound on `row . y^(n+1)` in a domain, which must be the domain of this flow.
-    pub(super) fn energy_bound(
-        &self,
-        oscillator: &Pair,
-        domain: &Domain,
-        row: [f64; 2],
-        n: u32,
-    ) -> EnergyBound {
-        EnergyBound::new(oscillator, domain, row, &self.table[n as usize - 1], n, self.unit)
     }
 
     /// Builds the flow of a gap at rest on a rigid wall, while the other displacement moves. Its [`acceleration`](Self::acceleration) is

@@ -1,10 +1,13 @@
 //! Random models of one or two coordinates with one gap.
 
-use rattlemap_dynamics::model::{Contact, Domain, Harmonic, Law, OuterWall, Pair, Side, Stage, State, state};
+use nalgebra::DVector;
+use rattlemap_dynamics::model::{
+    Contact, Domain, DryFriction, Harmonic, Law, Oscillator, Pair, Restitution, Side, Spring, Stage, Wall,
+};
 
-use super::super::machines::random as machines;
+use super::super::machines::random::Case;
 use crate::common::linear::{unforced, with_wall};
-use crate::common::pairs::{Friction, Rubbing};
+use crate::common::pairs::described;
 
 /// A reproducible sequence of numbers: SplitMix64.
 pub(crate) struct Random(pub(crate) u64);
@@ -51,23 +54,6 @@ pub(crate) struct Shape {
     pub(crate) friction: bool,
     /// Wide ranges: any signs of damping and stiffness, skew damping, very large and very small rates.
     pub(crate) wide: bool,
-}
-
-#[derive(Clone, Debug)]
-pub(crate) struct Case {
-    pub(crate) oscillator: Rubbing,
-    pub(crate) law: Law,
-    /// Between the walls.
-    pub(crate) start: State,
-}
-
-impl Case {
-    /// Returns the same model as a machine.
-    pub(crate) fn machine(&self) -> machines::Case {
-        let machine = self.oscillator.described(self.law);
-        let start = self.start[..2 * machine.degrees()].to_vec();
-        machines::Case { machine, start }
-    }
 }
 
 /// A model with nothing but a force of one harmonic and at most one wall on a side.
@@ -120,7 +106,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
     let none = [0.0; 2];
     let pair = |random: &mut Random, reach: f64| [random.even(reach), random.even(reach)];
     let load = if random.chance(0.4) { none } else { pair(random, 6.0) };
-    let free = Domain { damping, stiffness, load, preload: 0.0 };
+    let free = Domain { damping, stiffness, load };
     let contact = |random: &mut Random| [Contact::Impact, Contact::Rigid, Contact::Elastic][random.below(3)];
     let behind = |random: &mut Random| {
         let k = random.logarithmic(20.0, if shape.wide { 1e5 } else { 1e3 });
@@ -174,7 +160,7 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
             let load = [load[0] + moved[0], if is_single { 0.0 } else { load[1] + moved[1] }];
             let (damping, stiffness) = (times(damping, factors[1]), times(stiffness, factors[0]));
             let stage = walled(
-                Domain { damping, stiffness, load, preload: 0.0 },
+                Domain { damping, stiffness, load },
                 first.map(|[k, c]| [k * factors[1], c * factors[0]]),
             );
             oscillator.stages.push(Stage { free: stage.free, meshing: stage.meshing });
@@ -187,119 +173,104 @@ pub(crate) fn case(seed: u64, shape: Shape) -> Case {
         let count = oscillator.stage_count();
         oscillator.schedule = phases.iter().enumerate().map(|(i, &phase)| (phase, (i + 1) % count)).collect();
     }
+    let mut machine = described(&oscillator, Law::both(0.0, 0.0));
     if shape.walls {
-        add_walls(random, &mut oscillator);
+        add_walls(random, &mut machine);
     }
     if shape.pushing {
-        preload_walls(random, &mut oscillator);
+        preload_walls(random, &mut machine);
     }
-    let mut oscillator = Rubbing { pair: oscillator, friction: Vec::new() };
     if shape.friction {
-        add_friction(random, &mut oscillator);
+        add_friction(random, &mut machine);
     }
-    oscillator
-        .described(Law::both(0.0, 0.0))
-        .validate()
-        .unwrap_or_else(|error| panic!("{error}: {oscillator:?}"));
+    machine.validate().unwrap_or_else(|error| panic!("{error}: {machine:?}"));
     let restitution = [0; 2].map(|_| if random.chance(0.25) { 0.0 } else { random.between(0.0, 0.9) });
     // Without a mesh speed, impacts can be infinitely many.
     let mesh_speed =
         restitution.map(|e| if e == 0.0 && random.chance(0.3) { 0.0 } else { random.logarithmic(0.01, 2.0) });
+    for (i, walls) in machine.gaps[0].walls.iter_mut().enumerate() {
+        for wall in walls {
+            (wall.restitution, wall.mesh_speed) = (Restitution::Constant(restitution[i]), mesh_speed[i]);
+        }
+    }
     // The gap is half of the nearer wall.
     let inside = 0.5 * if walls[0].is_finite() { walls[0] } else { walls[1] };
-    let mut start = state(&[0.0, random.even(1.0), 0.0, random.even(1.0)]);
+    let mut start = vec![0.0, random.even(1.0), 0.0, random.even(1.0)];
     let other = oscillator.other();
     start[2 * (1 - other)] = inside / oscillator.gap[1 - other];
-    if is_single {
-        start[3] = 0.0;
-    }
-    Case { oscillator, law: Law { restitution, mesh_speed }, start }
+    start.truncate(2 * machine.degrees());
+    Case { machine, start }
 }
 
 /// Adds one to three walls behind each wall, or behind one of them. All but the last of a side become elastic.
-fn add_walls(random: &mut Random, o: &mut Pair) {
+fn add_walls(random: &mut Random, o: &mut Oscillator) {
     let only = random.below(3);
-    for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
-        let i = side.index();
-        if only == i && o.walls[1 - i].is_finite() {
+    let stages = o.stages.len();
+    for i in 0..2 {
+        if o.gaps[0].walls[i].is_empty() || only == i && !o.gaps[0].walls[1 - i].is_empty() {
             continue;
         }
-        let (last, mut at) = (std::mem::replace(&mut o.contacts[i], Contact::Elastic), o.walls[i]);
-        let mut domains: Vec<Domain> = (0..o.stage_count()).map(|stage| o.stage(stage).meshing[i]).collect();
+        let walls = &mut o.gaps[0].walls[i];
+        let last = walls[0].clone();
+        walls[0].contact = Contact::Elastic;
+        let mut at = last.at;
         let count = 1 + random.below(3);
         for nth in 0..count {
-            at += side.sign() * random.logarithmic(0.01, 0.5);
-            for free in &mut domains {
-                let spring = [
-                    random.logarithmic(20.0, 1e3),
-                    if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
-                ];
-                let inside = Pair { free: *free, ..o.clone() };
-                *free = with_wall(inside, side, at, Contact::Elastic, spring).meshing[i];
-            }
-            let contact = if nth + 1 == count { last } else { Contact::Elastic };
-            o.outer_walls[i].push(OuterWall { at, contact, meshing: domains.clone() });
+            at += Side::BOTH[i].sign() * random.logarithmic(0.01, 0.5);
+            let spring = |_| Spring {
+                stiffness: random.logarithmic(20.0, 1e3),
+                damping: if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
+                preload: None,
+            };
+            let springs = (0..stages).map(spring).collect();
+            let contact = if nth + 1 == count { last.contact } else { Contact::Elastic };
+            walls.push(Wall { at, contact, springs, ..last.clone() });
         }
     }
 }
 
-/// Makes the last wall of each side elastic. Most walls only push, and most have a preload.
-fn preload_walls(random: &mut Random, o: &mut Pair) {
-    for side in Side::BOTH.into_iter().filter(|side| o.walls[side.index()].is_finite()) {
-        let (i, gap) = (side.index(), o.gap);
+/// Makes the last wall of each side elastic, unless it is rigid. Most walls only push, and most have a preload.
+fn preload_walls(random: &mut Random, o: &mut Oscillator) {
+    for wall in o.gaps[0].walls.iter_mut().filter_map(|walls| walls.last_mut()) {
         let contact = if random.chance(0.8) { Contact::Pushing } else { Contact::Elastic };
         let sizes = [random.even(4.0), random.even(4.0)];
         let has_preload = random.chance(0.7);
-        let preload = |domain: &mut Domain, size: f64| {
-            if has_preload {
-                domain.preload = size;
-                (0..2).for_each(|i| domain.load[i] -= side.sign() * size * gap[i]);
-            }
-        };
-        let is_first = o.outer_walls[i].is_empty();
-        if let Some(wall) = o.outer_walls[i].last_mut().filter(|wall| wall.contact != Contact::Rigid) {
+        if wall.contact != Contact::Rigid {
             wall.contact = contact;
-            wall.meshing.iter_mut().enumerate().for_each(|(stage, domain)| preload(domain, sizes[stage % 2]));
-        }
-        if is_first && o.contacts[i] != Contact::Rigid {
-            o.contacts[i] = contact;
-            preload(&mut o.meshing[i], sizes[0]);
-            o.stages
-                .iter_mut()
-                .zip([1, 0, 1])
-                .for_each(|(stage, j)| preload(&mut stage.meshing[i], sizes[j]));
+            for (stage, spring) in wall.springs.iter_mut().enumerate().filter(|_| has_preload) {
+                spring.preload = Some(sizes[stage % 2]);
+            }
         }
     }
 }
 
 /// Adds one element with dry friction, or two, and sometimes removes the walls.
-fn add_friction(random: &mut Random, o: &mut Rubbing) {
+fn add_friction(random: &mut Random, o: &mut Oscillator) {
     if random.chance(0.15) {
-        o.walls = [f64::INFINITY, f64::NEG_INFINITY];
-        o.outer_walls = Default::default();
+        o.gaps[0].walls = Default::default();
     }
-    let amplitude =
-        o.all_harmonics().flat_map(|h| [h.cos, h.sin].concat()).fold(0.0, |a: f64, f| a.max(f.abs()));
-    let is_rigid = |side| o.last_wall(side).1 == Contact::Rigid && o.walls[side.index()].is_finite();
-    let is_double = o.degrees == 2 && !Side::BOTH.into_iter().any(is_rigid) && random.chance(0.5);
+    let (n, gap) = (o.degrees(), o.gap_row(0));
+    let amplitude = o.drives.iter().map(|drive| drive.cos.amax().max(drive.sin.amax())).fold(0.0, f64::max);
+    let mut last = o.gaps[0].walls.iter().filter_map(|walls| walls.last());
+    let is_double = n == 2 && !last.any(|wall| wall.contact == Contact::Rigid) && random.chance(0.5);
     for _ in 0..1 + usize::from(is_double) {
         let mut row = match random.below(3) {
             0 => {
                 let factor = [0.5, 1.0, -1.0][random.below(3)];
-                o.gap.map(|g| factor * g)
+                [factor * gap[0], factor * gap[1]]
             }
-            1 => [[1.0, 0.0], [0.0, 1.0]][random.below(o.degrees)],
-            _ => [random.between(0.5, 2.0), if o.degrees == 2 { random.even(2.0) } else { 0.0 }],
+            1 => [[1.0, 0.0], [0.0, 1.0]][random.below(n)],
+            _ => [random.between(0.5, 2.0), if n == 2 { random.even(2.0) } else { 0.0 }],
         };
-        if let Some(Friction { row: [a, b], .. }) = o.friction.first()
-            && (a * row[1] - b * row[0]).abs() < 0.2 * a.hypot(*b) * row[0].hypot(row[1])
+        if let Some((a, b)) = o.friction.first().map(|first| (first.row[0], first.row[1]))
+            && (a * row[1] - b * row[0]).abs() < 0.2 * a.hypot(b) * row[0].hypot(row[1])
         {
-            row = [-b, *a];
+            row = [-b, a];
         }
         let size = row[0].hypot(row[1]);
         let force = random.logarithmic(0.02, 0.8) * amplitude / size;
         let speed = if random.chance(0.75) { 0.0 } else { random.even(1.0) * size };
-        o.friction.push(Friction { row, force, speed });
+        o.friction.push(DryFriction::new(DVector::from_row_slice(&row[..n]), force, speed));
     }
 }
 
@@ -310,8 +281,7 @@ fn single(o: &mut Pair) {
     o.degrees = 1;
     o.mass = [[o.mass[0][0], 0.0], [0.0, 1.0]];
     o.gap[1] = 0.0;
-    o.free =
-        Domain { damping: first(damping), stiffness: first(stiffness), load: [load[0], 0.0], preload: 0.0 };
+    o.free = Domain { damping: first(damping), stiffness: first(stiffness), load: [load[0], 0.0] };
     (o.force[1], o.force_sin[1]) = (0.0, 0.0);
     for harmonic in &mut o.harmonics {
         (harmonic.cos[1], harmonic.sin[1]) = (0.0, 0.0);

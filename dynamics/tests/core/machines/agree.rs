@@ -278,7 +278,7 @@ mod program {
     fn check_one_gap(seeds: std::ops::Range<u64>) {
         let limits = Limits { most_noise: MACHINES.most_noise, ..ONE_GAP };
         for shape in SHAPES {
-            check_program(seeds.clone(), limits, |seed| one_gap::case(seed, shape).machine());
+            check_program(seeds.clone(), limits, |seed| one_gap::case(seed, shape));
         }
     }
 

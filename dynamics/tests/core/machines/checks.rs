@@ -171,7 +171,7 @@ fn energy(machine: &Oscillator, motion: &Motion, state: &[f64]) -> f64 {
         let side = if acting > 0 { Side::Right } else { Side::Left };
         for wall in &gap.walls[side.index()][..usize::from(acting.unsigned_abs())] {
             let (spring, depth) = (&wall.springs[0], side.sign() * (z - wall.at));
-            energy += 0.5 * spring.stiffness * depth * depth + spring.preload * depth;
+            energy += 0.5 * spring.stiffness * depth * depth + spring.force_at_wall() * depth;
         }
     }
     energy
@@ -252,9 +252,7 @@ fn check_side_by_side(count: usize, seeds: std::ops::Range<u64>, periods: usize,
         let shape = SHAPES[(seed % 5) as usize];
         let random = &mut Random(seed);
         let mut cases: Vec<Case> = (0..count as u64)
-            .map(|i| {
-                one_gap::case(1000 * i + seed, Shape { stages: shape.stages && i == 0, ..shape }).machine()
-            })
+            .map(|i| one_gap::case(1000 * i + seed, Shape { stages: shape.stages && i == 0, ..shape }))
             .collect();
         let omega = cases[0].machine.omega;
         cases.iter_mut().for_each(|case| case.machine.omega = omega);

@@ -1,16 +1,16 @@
 //! Dry friction in motions by matrix exponentials: closed forms, energy and limits.
 
 use nalgebra::{DVector, Matrix2, Vector2};
-use rattlemap_dynamics::model::{Contact, Law, Side, State, state};
+use rattlemap_dynamics::model::{Contact, Law, Oscillator, Side};
 use std::f64::consts::PI;
 
 use super::cycle::settle;
 use super::motion::{Mode, Motion, What};
-use super::random::apart;
+use super::random::{Case, apart};
 use super::system::{ANGLE, Grip, System};
 use crate::common::linear::Linear;
 use crate::common::pairs::{Friction, Rubbing};
-use crate::independent::random::{Case, PLAIN, Shape, case};
+use crate::independent::random::{PLAIN, Shape, case};
 
 const SHAPE: Shape = Shape { friction: true, ..PLAIN };
 
@@ -173,19 +173,22 @@ fn a_wall_takes_over_from_friction() {
     }
 }
 
+/// Returns displacements and velocities of a state.
+fn parts(y: &[f64]) -> [DVector<f64>; 2] {
+    [0, 1].map(|part| DVector::from_iterator(y.len() / 2, y.iter().skip(part).step_by(2).copied()))
+}
+
 /// Returns the energy of free motion without dampers.
-fn energy(o: &Rubbing, y: State) -> f64 {
-    let form = |m: [[f64; 2]; 2], a: f64, b: f64| m[0][0] * a * a + 2.0 * m[0][1] * a * b + m[1][1] * b * b;
-    0.5 * (form(o.mass, y[1], y[3]) + form(o.free.stiffness, y[0], y[2]))
+fn energy(o: &Oscillator, y: &[f64]) -> f64 {
+    let [x, v] = parts(y);
+    0.5 * (v.dot(&(&o.mass * &v)) + x.dot(&(&o.stages[0].stiffness * &x)))
 }
 
 /// Checks directions of sliding, and that the forces which hold sticking elements do not exceed friction.
-fn check_grips(o: &Rubbing, motion: &Motion) {
-    let matrix = |m: [[f64; 2]; 2]| Matrix2::new(m[0][0], m[0][1], m[1][0], m[1][1]);
-    let (per_mass, y) = (matrix(o.mass).try_inverse().unwrap(), state(&motion.state()));
-    let (x, v) = (Vector2::new(y[0], y[2]), Vector2::new(y[1], y[3]));
-    let mut forces = -matrix(o.free.stiffness) * x;
-    let rows: Vec<_> = o.friction.iter().map(|friction| Vector2::from(friction.row)).collect();
+fn check_grips(o: &Oscillator, motion: &Motion) {
+    let (per_mass, [x, v]) = (o.mass.clone().try_inverse().unwrap(), parts(&motion.state()));
+    let mut forces = -&o.stages[0].stiffness * x;
+    let rows: Vec<_> = o.friction.iter().map(|friction| &friction.row).collect();
     let mut stick = Vec::new();
     for (i, row) in rows.iter().enumerate() {
         match motion.grips[i] {
@@ -193,13 +196,13 @@ fn check_grips(o: &Rubbing, motion: &Motion) {
             grip => {
                 let sign = if grip == Grip::Plus { 1.0 } else { -1.0 };
                 assert!(sign * row.dot(&v) > -1e-13, "{grip:?} {}", row.dot(&v));
-                forces -= row * (sign * o.friction[i].force);
+                forces -= *row * (sign * o.friction[i].force);
             }
         }
     }
     let Some(&first) = stick.first() else { return };
-    let pulls = |i: usize| rows[i].dot(&(per_mass * forces));
-    let impulse = |i: usize, j: usize| rows[i].dot(&(per_mass * rows[j]));
+    let pulls = |i: usize| rows[i].dot(&(&per_mass * &forces));
+    let impulse = |i: usize, j: usize| rows[i].dot(&(&per_mass * rows[j]));
     let hold = match stick.get(1) {
         None => vec![pulls(first) / impulse(first, first)],
         Some(_) => {
@@ -213,27 +216,31 @@ fn check_grips(o: &Rubbing, motion: &Motion) {
     }
 }
 
+/// Multiplies all friction forces by a factor. No surface moves any more.
+fn weaken(o: &mut Oscillator, factor: f64) {
+    for friction in &mut o.friction {
+        let force = factor * friction.force;
+        (friction.force, friction.static_force, friction.speed) = (force, force, 0.0);
+    }
+}
+
 #[test]
 fn friction_does_the_work_that_is_lost() {
     let (mut slips, mut rests) = (0, 0);
     for seed in 0..400 {
-        let Case { mut oscillator, law, start } = case(seed, SHAPE);
-        let o = &mut oscillator;
-        (o.walls, o.force, o.force_sin) = ([f64::INFINITY, f64::NEG_INFINITY], [0.0; 2], [0.0; 2]);
-        (o.free.damping, o.free.load) = ([[0.0; 2]; 2], [0.0; 2]);
-        o.friction
-            .iter_mut()
-            .for_each(|friction| (friction.force, friction.speed) = (0.2 * friction.force, 0.0));
-        let o = &oscillator;
-        let whole = Case { oscillator: o.clone(), law, start }.machine();
-        let system = System::new(&whole.machine, ANGLE);
-        let mut motion = Motion::new(&system, &whole.start);
+        let Case { machine: mut o, start } = case(seed, SHAPE);
+        o.gaps[0].walls = Default::default();
+        o.drives.clear();
+        (o.stages[0].damping.fill(0.0), o.stages[0].load.fill(0.0));
+        weaken(&mut o, 0.2);
+        let (o, system) = (&o, System::new(&o, ANGLE));
+        let mut motion = Motion::new(&system, &start);
         for i in 1..100 {
             motion.run(0.05 * f64::from(i)).unwrap();
             check_grips(o, &motion);
-            let lost = energy(o, start) - energy(o, state(&motion.state()));
+            let lost = energy(o, &start) - energy(o, &motion.state());
             let work: f64 = o.friction.iter().zip(&motion.slid).map(|(one, slid)| one.force * slid).sum();
-            assert!((lost - work).abs() < 1e-12 * energy(o, start), "{seed}: lost {lost}, work {work}");
+            assert!((lost - work).abs() < 1e-12 * energy(o, &start), "{seed}: lost {lost}, work {work}");
         }
         if o.friction.len() == 2 {
             slips += motion.symbols.iter().filter(|symbol| **symbol == b'7').count();
@@ -249,17 +256,13 @@ fn friction_does_the_work_that_is_lost() {
 fn small_friction_changes_little() {
     let mut worst = 0.0f64;
     for seed in 0..100 {
-        let Case { mut oscillator, law, start } = case(seed, SHAPE);
-        oscillator
-            .friction
-            .iter_mut()
-            .for_each(|friction| (friction.force, friction.speed) = (1e-10 * friction.force, 0.0));
-        let without = Rubbing { friction: Vec::new(), ..oscillator.clone() };
-        let omega = oscillator.omega;
-        let ends = [oscillator, without].map(|oscillator| {
-            let whole = Case { oscillator, law, start }.machine();
-            let system = System::new(&whole.machine, ANGLE);
-            let mut motion = Motion::new(&system, &whole.start);
+        let Case { mut machine, start } = case(seed, SHAPE);
+        weaken(&mut machine, 1e-10);
+        let without = Oscillator { friction: Vec::new(), ..machine.clone() };
+        let omega = machine.omega;
+        let ends = [machine, without].map(|machine| {
+            let system = System::new(&machine, ANGLE);
+            let mut motion = Motion::new(&system, &start);
             motion.advance_period().and_then(|()| motion.advance_period()).unwrap();
             (motion.state(), events(&motion))
         });
@@ -276,11 +279,10 @@ fn tangents_are_limits_of_differences() {
     let mut found = [0; 3];
     for seed in 0..300 {
         let case = case(seed, Shape { stages: seed % 2 == 0, harmonics: seed % 3 == 0, ..SHAPE });
-        let whole = case.machine();
-        let system = System::new(&whole.machine, ANGLE);
-        let mut motion = Motion::new(&system, &whole.start);
+        let system = System::new(&case.machine, ANGLE);
+        let mut motion = Motion::new(&system, &case.start);
         (0..5).try_for_each(|_| motion.advance_period()).unwrap();
-        let count = case.oscillator.friction.len();
+        let count = case.machine.friction.len();
         if motion.acting(0) != 0 || motion.is_at_rest() {
             continue;
         }
@@ -295,7 +297,7 @@ fn tangents_are_limits_of_differences() {
         };
         let (_, exact, symbols) = image(motion.clone(), 0, 0.0);
         let size = exact.amax().max(1.0);
-        for i in 0..2 * case.oscillator.degrees {
+        for i in 0..case.start.len() {
             // A strongly curved motion needs small differences. A motion that amplifies rounding errors needs large ones.
             let off = |h: f64| {
                 let [above, below] = [h, -h].map(|h| image(motion.clone(), i, h / size));

@@ -122,12 +122,12 @@ fn walls(random: &mut Random, machine: &Oscillator, count: usize, at: f64, s: f6
         let spring = Spring {
             stiffness: random.logarithmic(20.0, 1e3),
             damping: if random.chance(0.3) { 0.0 } else { random.logarithmic(0.1, 5.0) },
-            preload: if has_preload { random.even(0.3 * force) } else { 0.0 },
+            preload: has_preload.then(|| random.even(0.3 * force)),
         };
         let of_stage = |random: &mut Random| Spring {
             stiffness: spring.stiffness * random.logarithmic(0.6, 1.6),
             damping: spring.damping * random.logarithmic(0.6, 1.6),
-            preload: spring.preload * random.between(0.5, 1.5),
+            preload: Some(random.between(0.5, 1.5)).and_then(|factor| Some(spring.preload? * factor)),
         };
         let springs =
             (0..machine.stages.len()).map(|i| if i == 0 { spring } else { of_stage(random) }).collect();

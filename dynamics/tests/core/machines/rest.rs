@@ -8,7 +8,7 @@ use rattlemap_dynamics::model::{
 };
 
 fn wall(at: f64, contact: Contact, e: f64) -> Wall {
-    let spring = Spring { stiffness: 10.0, damping: 0.0, preload: 0.0 };
+    let spring = Spring { stiffness: 10.0, damping: 0.0, preload: None };
     Wall { at, contact, restitution: Restitution::Constant(e), mesh_speed: 0.0, springs: vec![spring] }
 }
 

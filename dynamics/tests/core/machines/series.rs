@@ -9,8 +9,9 @@ use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, Orbit, Status, analyse_flow};
 use rayon::prelude::*;
 
+use super::random::Case;
 use crate::common::BUDGET;
-use crate::independent::random::{self as one_gap, Case, PLAIN, Random};
+use crate::independent::random::{self as one_gap, PLAIN, Random};
 
 /// The sum of two numbers, of which the second is less than the rounding error of the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -515,20 +516,21 @@ fn image(
 fn model(seed: u64) -> Case {
     let mut case = one_gap::case(seed, PLAIN);
     let random = &mut Random(seed ^ 0x7345_12ab);
-    for side in Side::BOTH {
-        let contacts = &mut case.oscillator.contacts;
-        if contacts[side.index()].is_elastic() {
-            contacts[side.index()] = Contact::Impact;
+    for walls in &mut case.machine.gaps[0].walls {
+        let restitution = Restitution::Constant(random.between(0.1, 0.95));
+        for wall in walls {
+            if wall.contact.is_elastic() {
+                wall.contact = Contact::Impact;
+            }
+            (wall.restitution, wall.mesh_speed) = (restitution, 0.0);
         }
-        case.law.restitution[side.index()] = random.between(0.1, 0.95);
     }
-    case.law.mesh_speed = [0.0; 2];
     case
 }
 
 fn described(seed: u64, case: &Case) -> Oscillator {
     let random = &mut Random(seed ^ 0x1e_4433);
-    let mut machine = case.machine().machine;
+    let mut machine = case.machine.clone();
     match seed % 4 {
         0 => {
             for wall in machine.gaps[0].walls.iter_mut().flatten() {
@@ -599,10 +601,10 @@ fn compare(seed: u64) -> Vec<(&'static str, Off)> {
     let machine = described(seed, &case);
     let find = |name: &'static str, form: Form| {
         let flow = Flow::new(form);
-        let orbit = analyse_flow(&flow, case.law, state(&case.start), &BUDGET.settings, 0);
+        let orbit = analyse_flow(&flow, case.machine.law(), state(&case.start), &BUDGET.settings, 0);
         Some((name, off(&machine, &orbit)?))
     };
-    let pair = (seed % 4 > 1).then(|| find("pair", case.oscillator.form(case.law))).flatten();
+    let pair = (seed % 4 > 1).then(|| find("pair", Form::from(&case.machine))).flatten();
     let name = ["by speed", "friction", "machine", "machine"][(seed % 4) as usize];
     pair.into_iter().chain(find(name, Form::Machine(machine.clone()))).collect()
 }

@@ -286,14 +286,14 @@ impl System {
         let spring = &wall.springs[stage];
         let curve = self.curves.iter().zip(passed).find(|(curve, _)| curve.wall == Some((gap, side)));
         let may_pull = spring.damping != 0.0
-            || spring.preload != 0.0
+            || spring.force_at_wall() != 0.0
             || curve.is_some_and(|(curve, _)| curve.may_pull());
         if wall.contact != Contact::Pushing || !may_pull {
             return None;
         }
         let s = side.sign();
         let mut row = (&self.z[gap] * spring.stiffness + &self.w[gap] * spring.damping) * s;
-        row[2 * self.degrees] = spring.preload - s * spring.stiffness * wall.at;
+        row[2 * self.degrees] = spring.force_at_wall() - s * spring.stiffness * wall.at;
         if let Some((curve, &passed)) = curve {
             let [slope, force] = curve.line(passed);
             row += &curve.argument * slope;
@@ -341,7 +341,7 @@ impl System {
                 let spring = &wall.springs[key.stage];
                 stiffness += &square * spring.stiffness;
                 damping += &square * spring.damping;
-                load += &gap.row * (spring.stiffness * wall.at - side.sign() * spring.preload);
+                load += &gap.row * (spring.stiffness * wall.at - side.sign() * spring.force_at_wall());
             }
         }
         for (i, (friction, grip)) in machine.friction.iter().zip(&key.grips).enumerate() {

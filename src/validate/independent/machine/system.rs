@@ -392,7 +392,7 @@ impl System {
     ) -> Option<Functional> {
         let wall = self.walls(gap, side).last()?;
         let curve = self.springs.iter().position(|spring| spring.wall == Some((gap, side)));
-        let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.preload != 0.0)
+        let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.force_at_wall() != 0.0)
             || curve.is_some_and(|i| self.springs[i].may_pull());
         if wall.contact != Contact::Pushing || !may_pull {
             return None;
@@ -400,7 +400,7 @@ impl System {
         let (spring, s) = (wall.springs[stage], side.sign());
         let mut row = [0.0; WIDTH];
         (row[gap], row[self.n + gap]) = (s * spring.stiffness, s * spring.damping);
-        row[self.width() - 1] = spring.preload - s * spring.stiffness * wall.at;
+        row[self.width() - 1] = spring.force_at_wall() - s * spring.stiffness * wall.at;
         if let Some(i) = curve {
             let [slope, force] = self.springs[i].force.pieces[usize::from(pieces[MOST_FRICTION + i])];
             row[gap] += s * slope;
@@ -441,10 +441,11 @@ impl System {
         for (gap, &acting) in key.acting.iter().enumerate().take(self.gaps()) {
             let side = if acting > 0 { Side::Right } else { Side::Left };
             for wall in &self.walls(gap, side)[..usize::from(acting.unsigned_abs())] {
-                let Spring { stiffness: k, damping: c, preload } = wall.springs[key.stage];
+                let spring = wall.springs[key.stage];
+                let Spring { stiffness: k, damping: c, .. } = spring;
                 stiffness[(gap, gap)] += k;
                 damping[(gap, gap)] += c;
-                load[gap] += k * wall.at - side.sign() * preload;
+                load[gap] += k * wall.at - side.sign() * spring.force_at_wall();
             }
         }
         for (i, element) in self.elements.iter().enumerate() {
@@ -558,7 +559,7 @@ fn transformed(machine: &Oscillator, [length, speed]: [f64; 2], from: &DMatrix<f
         let spring = |&Spring { stiffness, damping, preload }: &Spring| Spring {
             stiffness,
             damping: damping * omega,
-            preload: preload / length,
+            preload: preload.map(|preload| preload / length),
         };
         let restitution = match wall.restitution {
             Restitution::BySpeed { constant, factor, power } => {

@@ -234,7 +234,6 @@ fn cycles_are_those_of_the_reference() {
             damping: [[0.3, 0.05], [0.05, 0.2]],
             stiffness: [[4.0 + even(2.0), -1.0], [-1.0, 6.0 + even(3.0)]],
             load: [even(1.0), even(1.0)],
-            preload: 0.0,
         };
         let gap = [1.0, [-1.0, 0.4][n % 2]];
         let mut behind = free;
