@@ -103,6 +103,11 @@ fn residual(model: &FileModel) -> (f64, usize) {
                 pushed += usize::from(force != 0.0);
                 terms.push(side * force * gap.row[i]);
             }
+            for spring in oscillator.springs.iter().filter(|spring| spring.wall.is_none()) {
+                let of = |(factor, name): (&f64, &&str)| factor * rows.number(row, name);
+                let elongation = spring.row.iter().zip(states.iter().step_by(2)).map(of).sum();
+                terms.push(spring.row[i] * spring.curve().at(elongation));
+            }
             for (element, force) in oscillator.friction.iter().zip(&elements) {
                 terms.push(rows.number(row, force) * element.row[i]);
             }

@@ -127,7 +127,7 @@ impl Frame {
     pub(super) fn vanishes_at_wall(&self, modes: &Modes, gap: usize, side: Side) -> bool {
         let spring = self.last_wall(gap, side).springs[modes.stage];
         let is_first = self.curve_of_wall(gap, side).is_none_or(|i| modes.pieces[i] == 0);
-        is_first && spring.damping == 0.0 && spring.preload == 0.0
+        is_first && spring.damping == 0.0 && spring.force_at_wall() == 0.0
     }
 
     /// Returns the row of the force of a side's last wall, positive where it pushes.

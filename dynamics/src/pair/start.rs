@@ -40,7 +40,7 @@ impl<'f> PairMotion<'f, 0> {
         observer: &mut impl Observer,
     ) -> Self {
         let mut trajectory = PairMotion::meshing_from(flow, law, y, meshing);
-        trajectory.enter_stage(trajectory.stage, observer);
+        trajectory.enter_stage(trajectory.flow, observer);
         trajectory
     }
 }

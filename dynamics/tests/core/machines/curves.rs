@@ -85,7 +85,7 @@ fn mass(damping: f64, omega: f64, force: f64, walls: [Vec<Wall>; 2]) -> Oscillat
 }
 
 fn wall(at: f64, contact: Contact, damping: f64) -> Wall {
-    let springs = vec![Spring { stiffness: 0.0, damping, preload: 0.0 }];
+    let springs = vec![Spring { stiffness: 0.0, damping, preload: None }];
     Wall { at, contact, restitution: Restitution::Constant(0.5), mesh_speed: 0.0, springs }
 }
 

@@ -599,7 +599,7 @@ impl<'a> Motion<'a> {
             let vanishes_at_wall = |wall: &Wall| {
                 let spring = wall.springs[self.stage];
                 let is_first = curve.is_none_or(|curve| self.passed[curve] == 1);
-                is_first && spring.damping == 0.0 && spring.preload == 0.0
+                is_first && spring.damping == 0.0 && spring.force_at_wall() == 0.0
             };
             let walls = &self.system.machine.gaps[i].walls[side_of(gap.level).index()];
             if let (Mode::Plain | Mode::Open, Some(row)) = (gap.mode, self.pushing(i))

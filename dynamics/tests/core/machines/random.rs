@@ -457,7 +457,7 @@ fn bend(random: &mut Random, machine: &mut Oscillator, rest: &Vector, has_any_ro
             }
             let pulls = pulls && force.iter().all(|point| point[1] >= 0.0);
             wall.contact = if pulls { Contact::Elastic } else { Contact::Pushing };
-            wall.springs.iter_mut().for_each(|spring| (spring.stiffness, spring.preload) = (0.0, 0.0));
+            wall.springs.iter_mut().for_each(|spring| (spring.stiffness, spring.preload) = (0.0, None));
             let points = force.iter().map(|[at, force]| [side.sign() * wall.at + at, *force]).collect();
             let wall = Some((gap, side));
             machine.springs.push(NonlinearSpring { row: &*row * side.sign(), points, wall });
