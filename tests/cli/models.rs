@@ -293,7 +293,7 @@ fn dry_friction_is_printed() {
 #[test]
 fn several_gaps_and_restitution_by_speed_are_printed() {
     let folder = empty();
-    fs::write(folder.path().join("my-driveline.toml"), toml(10)).unwrap();
+    fs::write(folder.path().join("my-driveline.toml"), toml(12)).unwrap();
     let page = stdout(&folder, "models my-driveline.toml");
     for part in [
         "gap   mesh = x1 - x2\n    rate  mesh' = v1 - v2\n    gap   shaft = x2 - x3\n",
