@@ -653,7 +653,12 @@ mod tests {
             distance("harmonic", |record, first| record.measures[first + 1] += std::f64::consts::TAU + 1e-3);
         assert!((turned - 1e-3).abs() < 1e-6, "{turned}");
         assert!(distance("rms", |record, first| record.measures[first + 2] = 0.6) > 0.19, "the gap");
-        assert!(distance("rms", |record, _| record.measures[OF_GAPS - 17] = 0.6) > 0.19, "the last gap");
+        let last_gap = |record: &mut Record, _| {
+            let is_last = |measure: &Measure| matches!(measure.subject, Some(Subject::Gap(gap)) if gap + 1 == MOST_GAPS);
+            let place = Group::named("rms").unwrap().measures().find(is_last).unwrap().place;
+            record.measures[place] = 0.6;
+        };
+        assert!(distance("rms", last_gap) > 0.19, "the last gap");
     }
 
     /// An amplitude that is a thousand times smaller than the mean.

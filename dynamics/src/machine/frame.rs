@@ -287,7 +287,8 @@ impl Frame {
     /// pulls, like any elastic wall.
     pub(super) fn pushing(&self, gap: usize, side: Side) -> Option<&Wall> {
         let last = self.walls(gap, side).last()?;
-        let differs = last.springs.iter().any(|spring| spring.damping != 0.0 || spring.force_at_wall() != 0.0);
+        let differs =
+            last.springs.iter().any(|spring| spring.damping != 0.0 || spring.force_at_wall() != 0.0);
         let may_pull =
             || self.curve_of_wall(gap, side).is_some_and(|i| self.springs[i - MOST_FRICTION].may_pull);
         (last.contact == Contact::Pushing && (differs || may_pull())).then_some(last)

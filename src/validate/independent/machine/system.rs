@@ -378,7 +378,9 @@ impl System {
     pub(super) fn is_zero_at_wall(&self, gap: usize, side: Side, stage: usize, pieces: &Pieces) -> bool {
         let Some(spring) = self.walls(gap, side).last().map(|wall| wall.springs[stage]) else { return false };
         let curve = self.springs.iter().position(|spring| spring.wall == Some((gap, side)));
-        spring.damping == 0.0 && spring.force_at_wall() == 0.0 && curve.is_none_or(|i| pieces[MOST_FRICTION + i] == 0)
+        spring.damping == 0.0
+            && spring.force_at_wall() == 0.0
+            && curve.is_none_or(|i| pieces[MOST_FRICTION + i] == 0)
     }
 
     /// Returns the row of the force of a side's last wall, positive away from the wall, if this wall only pushes. None if the force never
@@ -392,8 +394,9 @@ impl System {
     ) -> Option<Functional> {
         let wall = self.walls(gap, side).last()?;
         let curve = self.springs.iter().position(|spring| spring.wall == Some((gap, side)));
-        let may_pull = wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.force_at_wall() != 0.0)
-            || curve.is_some_and(|i| self.springs[i].may_pull());
+        let may_pull =
+            wall.springs.iter().any(|spring| spring.damping != 0.0 || spring.force_at_wall() != 0.0)
+                || curve.is_some_and(|i| self.springs[i].may_pull());
         if wall.contact != Contact::Pushing || !may_pull {
             return None;
         }
