@@ -442,9 +442,9 @@ fn bend(random: &mut Random, machine: &mut Oscillator, rest: &Vector, has_any_ro
         let factor = if is_symmetric || random.chance(0.5) { 1.0 } else { -1.0 };
         machine.springs.push(NonlinearSpring { row: row * factor, points, wall: None });
     }
-    for gap in 0..machine.gaps.len() {
+    for (gap, reach) in reaches.iter().enumerate() {
         let bent = [0, 1].map(|_| random.chance(0.7));
-        let (depth, slope) = (reaches[gap][1].max(0.05), random.logarithmic(10.0, 300.0));
+        let (depth, slope) = (reach[1].max(0.05), random.logarithmic(10.0, 300.0));
         let pieces = 1 + random.below(6);
         let length = depth * random.logarithmic(0.02, 0.3);
         let force = points(random, pieces, [0.0, 0.0], length, slope);
