@@ -20,6 +20,7 @@ for scene in scenes/gallery/*.toml; do
     "$program" map "$scene" --engine cpu --out "$out/$name" --force
     case "$name" in
         friction_oscillator | relief_valve) publish "$name" pattern.png ;;
+        belt_oscillator) publish "$name" stick_fraction.png ;;
         *) publish "$name" map.png ;;
     esac
 done
