@@ -231,7 +231,8 @@ fn friction_does_the_work_that_is_lost() {
         let Case { machine: mut o, start } = case(seed, SHAPE);
         o.gaps[0].walls = Default::default();
         o.drives.clear();
-        (o.stages[0].damping.fill(0.0), o.stages[0].load.fill(0.0));
+        o.stages[0].damping.fill(0.0);
+        o.stages[0].load.fill(0.0);
         weaken(&mut o, 0.2);
         let (o, system) = (&o, System::new(&o, ANGLE));
         let mut motion = Motion::new(&system, &start);
