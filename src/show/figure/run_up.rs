@@ -14,9 +14,9 @@ use crate::show::symbols::{axis_label, number, symbol, with_unit};
 use rattlemap_dynamics::model::{Model, ModelError, Side};
 use rattlemap_dynamics::orbit::{Event, EventKind};
 
-/// Name of the file of [`draw`] without its extension.
+/// Name of the file of the figure of the motion without its extension.
 pub const RUN_UP: &str = "run_up";
-/// Name of the file of [`draw_campbell`] without its extension.
+/// Name of the file of the Campbell diagram without its extension.
 pub const CAMPBELL: &str = "campbell";
 
 /// Width, least distance of panels from the left edge, height of head and foot, and height of a panel.
