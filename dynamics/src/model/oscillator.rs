@@ -275,9 +275,10 @@ impl Curve {
     fn new(first: [f64; 2], further: &[[f64; 2]], last: [f64; 2]) -> Curve {
         let mut before = first;
         let piece = |&[at, value]: &[f64; 2]| {
-            let slope = (value - before[1]) / (at - before[0]);
+            let ([from, start], slope) = (before, (value - before[1]) / (at - before[0]));
             before = [at, value];
-            [slope, value - slope * at]
+            // Exact where `from` is 0: friction must not fall by a rounding error when sliding begins.
+            [slope, start - slope * from]
         };
         let pieces = further.iter().map(piece).chain([last]).collect();
         Curve { borders: further.iter().map(|point| point[0]).collect(), pieces }

@@ -209,7 +209,10 @@ impl MachineMotion<'_> {
         if !lasts && pressing <= 0.0 && approach < GRAZING_SPEED * system.speed {
             self.near_grazing = true;
         }
-        self.jumps.push((gap, jump));
+        // A gap that begins to press its wall from rest does so in neighbouring motions, too.
+        if approach > 0.0 {
+            self.jumps.push((gap, jump));
+        }
         self.point = point;
         let (kind, meshing) = if lasts {
             (EventKind::MeshStart, Some(side))

@@ -5,7 +5,7 @@ use rattlemap_dynamics::word::Word;
 
 use super::motion::{Mode, Motion, What};
 use super::random::apart;
-use super::system::{Grip, Matrix, System, Vector};
+use super::system::{ANGLE, Grip, Matrix, System, Vector};
 
 /// Longest cycle that is searched, in forcing periods.
 const LONGEST: usize = 12;
@@ -34,6 +34,8 @@ pub(crate) struct Cycle {
     pub(crate) strobes: Vec<Strobe>,
     /// Largest modulus of the multipliers, except multipliers of elements that stick for ever and of conserved momenta.
     pub(crate) radius: f64,
+    /// Difference of this modulus with other steps.
+    pub(crate) radius_noise: f64,
     /// Mean rates of the coordinates along directions in which nothing holds the machine.
     pub(crate) drift: Vector,
     /// None if events of two gaps are simultaneous.
@@ -100,16 +102,24 @@ pub(crate) fn follow(start: &Motion, period: usize) -> Option<Cycle> {
     motion.clear();
     let mut shaken = motion.shaken();
     let (mut strobes, mut noise) = (Vec::new(), 0.0f64);
+    let finer = System::new(&system.machine, 0.6 * ANGLE);
+    let mut other = motion.in_system(&finer);
     motion.carry_tangents();
+    other.carry_tangents();
     for _ in 0..period {
         strobes.push(strobe(&motion));
         motion.advance_period()?;
+        other.advance_period()?;
         noise = noise.max(motion.noise(&mut shaken)?);
     }
-    let mut multipliers: Vec<_> = motion.derivative().complex_eigenvalues().iter().copied().collect();
-    multipliers.sort_by(|a, b| (a - 1.0).norm().total_cmp(&(b - 1.0).norm()));
+    let radius = |motion: &Motion| {
+        let mut multipliers: Vec<_> = motion.derivative().complex_eigenvalues().iter().copied().collect();
+        multipliers.sort_by(|a, b| (a - 1.0).norm().total_cmp(&(b - 1.0).norm()));
+        multipliers[system.conserved..].iter().map(|m| m.norm()).fold(0.0, f64::max)
+    };
     Some(Cycle {
-        radius: multipliers[system.conserved..].iter().map(|m| m.norm()).fold(0.0, f64::max),
+        radius: radius(&motion),
+        radius_noise: (radius(&motion) - radius(&other)).abs(),
         drift: &motion.travelled / (period as f64 * system.period),
         word: word(&motion),
         impacts: motion.events.iter().filter(|event| event.what == What::Impact).count(),

@@ -90,7 +90,9 @@ fn compare(case: &Case, form: Form) -> Result<Agreement, String> {
         _ if cycle.first_return(10.0 * STROBE_OFF, machine.omega) < period as usize => {
             "a divisor of the period is a period".to_owned()
         }
-        _ if (cycle.radius - theirs).abs() > f64::from(period) * (MULTIPLIER_OFF + NOISES * noise) => {
+        _ if (cycle.radius - theirs).abs()
+            > f64::from(period) * (MULTIPLIER_OFF + NOISES * noise) + NOISES * cycle.radius_noise =>
+        {
             format!("multipliers {} and {theirs}", cycle.radius)
         }
         _ if drifts_apart(&cycle, &orbit, machine) => {

@@ -252,11 +252,16 @@ impl<'a> Motion<'a> {
         self.slid.fill(0.0);
     }
 
-    /// Begins to carry unit tangents. A gap at rest on a wall has no neighbours off the wall, and elements that stick have none with a
-    /// rate; those that stick for good have none in another place.
+    /// Begins to carry unit tangents.
     pub(crate) fn carry_tangents(&mut self) {
+        let size = 2 * self.system.degrees;
+        self.tangents = Some(self.held(Matrix::identity(size, size)));
+    }
+
+    /// Projects tangents: a gap at rest on a wall has no neighbours off the wall, and elements that stick have none with a rate; those that
+    /// stick for good have none in another place.
+    pub(super) fn held(&self, mut tangents: Matrix) -> Matrix {
         let n = self.system.degrees;
-        let mut tangents = Matrix::identity(2 * n, 2 * n);
         for (row, (change, _), element) in self.at_rest() {
             let one = Matrix::identity(n, n) - change * row.transpose();
             let mut all = Matrix::identity(2 * n, 2 * n);
@@ -266,7 +271,7 @@ impl<'a> Motion<'a> {
             }
             tangents = all * tangents;
         }
-        self.tangents = Some(tangents);
+        tangents
     }
 
     /// Returns two copies of the motion with known errors of velocities at each event: errors of one sign and of both signs, because errors
@@ -274,6 +279,14 @@ impl<'a> Motion<'a> {
     pub(crate) fn shaken(&self) -> Vec<Motion<'a>> {
         let with = |signs: [f64; 4]| Motion { shaken: signs.map(|sign| SHAKEN * sign), ..self.clone() };
         vec![with([1.0; 4]), with([1.0, 1.0, -1.0, -1.0])]
+    }
+
+    /// Returns the motion with the steps of another system of the same machine.
+    pub(crate) fn in_system<'b>(&self, system: &'b System) -> Motion<'b>
+    where
+        'a: 'b,
+    {
+        Motion { system, ..self.clone() }
     }
 
     /// Advances the shaken motions. Returns their largest distance from this one.
