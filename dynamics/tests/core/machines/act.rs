@@ -33,6 +33,17 @@ struct Joint {
 impl Motion<'_> {
     /// Ends a flight.
     pub(super) fn act(&mut self, end: End, at_start: bool) {
+        for i in 0..self.gaps.len() {
+            let is_own = match end {
+                End::Crosses(gap, _) => gap == i,
+                End::Rests(element) | End::Slips(element, _) => self.rubs(element, i),
+                End::Bends(curve, _) => curve < self.grips.len() && self.rubs(curve, i),
+                _ => false,
+            };
+            if !is_own {
+                self.break_series(i);
+            }
+        }
         if let End::Bends(i, is_next) = end {
             return self.bend(i, is_next);
         }
@@ -121,6 +132,7 @@ impl Motion<'_> {
     pub(super) fn change(&mut self, stage: usize) {
         let (grips, stuck, is_still) = (self.grips.clone(), self.stuck(), self.linear().is_still.clone());
         let before = self.modes();
+        (0..self.gaps.len()).for_each(|i| self.break_series(i));
         self.stage = stage;
         self.settle(&grips, &stuck, &is_still, None, true);
         for (before, _) in before.iter().zip(self.modes()).filter(|(before, after)| *before != after) {
@@ -181,7 +193,10 @@ impl Motion<'_> {
         for (i, &before) in before.iter().enumerate() {
             let after = self.grips[i];
             if after != Grip::Stick && after != before && (before == Grip::Stick || cause == Some(i)) {
-                if self.gaps.iter().any(|gap| gap.series == Series::Uncounted) {
+                let is_in_series = |j: &usize| {
+                    matches!(self.gaps[*j].series, Series::Uncounted | Series::Low) && self.rubs(i, *j)
+                };
+                if (0..self.gaps.len()).any(|j| is_in_series(&j)) {
                     continue;
                 }
                 let symbol = if before == Grip::Stick { b'7' } else { b'0' };
@@ -447,8 +462,10 @@ impl Motion<'_> {
             after(self, &joint, e, Mode::Plain);
             later = 2.0 * e * closing / ((1.0 - e) * acceleration(self, i));
             reverses = self.reverses(&joint.change, s * e * closing);
+            let is_alone =
+                start.gaps[i].series != Series::Broken && joint.released.is_empty() && keep.is_empty();
             // At a reversal, the height of a flight loses digits.
-            let is_deep = match reverses.contains(&true) {
+            let is_deep = match reverses.contains(&true) || !is_alone {
                 false => later <= DEEPEST_REST * self.linear().radian,
                 true => e * closing <= limit(self, i),
             };
@@ -487,13 +504,29 @@ impl Motion<'_> {
         }
         let is_slow = wall.mesh_speed < e * closing && e * closing <= limit(self, i);
         let presses = !lasts && e < 1.0 && self.presses(&self.linear(), i, side);
-        let before = start.gaps[i].series;
+        if !joint.released.is_empty() || !keep.is_empty() {
+            self.break_series(i);
+        }
+        let before = self.gaps[i].series;
         let ends = before == Series::Short || is_slow;
         // The limit under friction along the gap is tested elsewhere.
         self.is_crowded |= reverses[0] && (presses && ends || lasts && whole > 1.0);
-        if before != Series::Uncounted {
-            let what = if lasts || presses && ends { What::Begins } else { What::Impact };
-            self.record_as(i, what, side, symbol(&start.gaps[i], side));
+        match before {
+            Series::Low => {}
+            Series::Uncounted => {
+                let what = if is_slow { What::Begins } else { What::Impact };
+                let t = self.time();
+                let uncounted = &mut self.gaps[i].uncounted;
+                if uncounted.iter().all(|(what, _)| *what == What::Impact) {
+                    uncounted.push((what, t));
+                }
+            }
+            _ => {
+                let what = if lasts || presses && ends { What::Begins } else { What::Impact };
+                self.record_as(i, what, side, symbol(&start.gaps[i], side));
+                let counted = if is_slow { What::Begins } else { What::Impact };
+                self.gaps[i].uncounted = vec![(counted, self.time())];
+            }
         }
         let t = self.time() + later;
         if let Some(event) = self.events.iter_mut().rfind(|event| event.gap == i)
@@ -503,12 +536,13 @@ impl Motion<'_> {
             event.t = t;
         }
         self.gaps[i].series = match before {
-            _ if !presses => Series::Long,
-            Series::Long if !is_slow => {
+            _ if !presses => Series::Broken,
+            Series::Broken | Series::Long if !is_slow => {
                 let is_endless = slope == 0.0 && wall.mesh_speed == 0.0 && !reverses[1];
                 let is_short = is_endless && later < SHORT_REST * self.linear().radian;
                 if is_short { Series::Short } else { Series::Long }
             }
+            Series::Low => Series::Low,
             _ => Series::Uncounted,
         };
         if !lasts {
@@ -522,15 +556,58 @@ impl Motion<'_> {
         reset
     }
 
+    /// Whether an element stops and reverses in each flight of a gap's series of impacts: it has no rate when the gap has none.
+    fn rubs(&self, element: usize, gap: usize) -> bool {
+        let (gaps, stuck) = (&self.system.machine.gaps, self.stuck());
+        let held = (0..gaps.len()).filter(|&other| other != gap && stuck[other].is_some()).chain([gap]);
+        let rows: Vec<&Vector> = held.map(|i| &gaps[i].row).collect();
+        let kick = self.system.bonds(&rows).pop().expect("the gap").0;
+        let rate = self.of(&self.system.w[gap]);
+        let velocities = self.y.rows(self.system.degrees, self.system.degrees) - &kick * rate;
+        let friction = &self.system.machine.friction[element];
+        let slides = (friction.row.dot(&velocities) - friction.speed).abs();
+        let along = friction.row.dot(&kick).abs() > ROUNDING * friction.row.norm() * kick.norm();
+        along && slides <= SMALL * self.size_of_rate(&self.system.slides[element])
+    }
+
+    /// Counts the impacts of a gap's series that have not been counted, because something else happens before their limit.
+    pub(super) fn break_series(&mut self, i: usize) {
+        let uncounted = std::mem::take(&mut self.gaps[i].uncounted);
+        match self.gaps[i].series {
+            Series::Low => return,
+            Series::Uncounted => {}
+            _ => {
+                self.gaps[i].series = Series::Broken;
+                return;
+            }
+        }
+        let is_low = uncounted.iter().any(|(what, _)| *what == What::Begins);
+        self.gaps[i].series = if is_low { Series::Low } else { Series::Broken };
+        let Some(last) = self.events.iter_mut().rfind(|event| event.gap == i) else { return };
+        last.what = uncounted[0].0;
+        let (side, symbol) = (last.side, Some(if last.side == Side::Right { b'2' } else { b'5' }));
+        for &(what, t) in &uncounted[1..] {
+            self.record_as(i, what, side, symbol);
+            self.events.last_mut().expect("the recorded event").t = t;
+        }
+    }
+
     /// Whether an element reverses while a gap with this rate comes to rest in impacts: in each flight, or in some.
     fn reverses(&self, kick: &Vector, rate: f64) -> [bool; 2] {
         let velocities = self.y.rows(self.system.degrees, self.system.degrees) + kick * rate;
         let mut reverses = [false; 2];
-        for friction in &self.system.machine.friction {
+        for (i, friction) in self.system.machine.friction.iter().enumerate() {
+            let sticks = || {
+                let mut held = self.clone();
+                held.grips[i] = Grip::Stick;
+                let falls = friction.static_force > friction.force;
+                self.grips[i] == Grip::Stick
+                    || falls && held.of(&held.linear().hold[i]).abs() <= friction.static_force
+            };
             let (along, size) = (friction.row.dot(kick).abs(), friction.row.norm() * kick.norm());
             let slides = (friction.row.dot(&velocities) - friction.speed).abs();
             if along > ROUNDING * size && slides <= 2.0 * along * rate.abs() {
-                reverses[usize::from(slides > SMALL * size)] = true;
+                reverses[usize::from(slides > SMALL * size || sticks())] = true;
             }
         }
         reverses

@@ -65,17 +65,23 @@ pub(super) struct Gap {
     pub(super) is_unpressed: bool,
     /// The wall of the last event.
     pub(super) origin: Option<Side>,
-    /// The stage of a series of impacts.
+    /// The stage of a series of impacts, and times of the impacts that it has not counted.
     pub(super) series: Series,
+    pub(super) uncounted: Vec<(What, f64)>,
 }
 
-/// Impacts are counted until the rest of their series is short. Then they are followed to the limit, which counts as one event.
+/// Impacts are counted until the rest of their series is short. Then they are followed to the limit, which counts as one event. If something
+/// else happens before the limit, the rest is no series of its own, and its impacts are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Series {
+    /// Something else has happened since the last impact.
+    Broken,
     Long,
     /// The next impact is not counted.
     Short,
     Uncounted,
+    /// The flights are so low that the gap counts as at rest.
+    Low,
 }
 
 /// The end of a flight.
@@ -180,7 +186,8 @@ impl<'a> Motion<'a> {
             is_unloaded: false,
             is_unpressed: false,
             origin: None,
-            series: Series::Long,
+            series: Series::Broken,
+            uncounted: Vec::new(),
         };
         let mut motion = Motion {
             system,
@@ -495,6 +502,7 @@ impl<'a> Motion<'a> {
             }
         }
         self.run(system.period)?;
+        (0..self.gaps.len()).for_each(|i| self.break_series(i));
         self.periods += 1;
         self.begin_period();
         if let Some(stage) = at_end {
