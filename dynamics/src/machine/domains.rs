@@ -91,7 +91,7 @@ impl System {
         })
     }
 
-    /// Returns the first consistent combination of modes. Holding walls and sticking elements are tried first. If rows depend on each other,
+    /// Returns the first consistent combination of modes. Present modes of gaps and sticking elements are tried first. If rows depend on each other,
     /// the later ones bear no force at first. If no combination is consistent then, friction forces at their limits are tried, too: if
     /// friction is the same at rest and while sliding, all combinations that are consistent give the same accelerations.
     pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> Option<Modes> {
@@ -106,7 +106,7 @@ impl System {
                     number /= Slip::ALL.len();
                 }
                 for (gap, side) in gaps() {
-                    let is_held = number % 2 == 0;
+                    let is_held = (number % 2 == 0) == modes.gaps[gap].rest().is_some();
                     let free = self.before_last(gap, side);
                     tried.gaps[gap] = if is_held { GapMode::Stuck(side) } else { free };
                     number /= 2;

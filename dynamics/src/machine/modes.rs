@@ -209,21 +209,24 @@ impl Frame {
             let rows = self.ties.iter().map(|tie| (*tie, 0.0)).chain(sticking);
             return project(&mut y[n..2 * n], rows, |j, w| is_stuck(j) || fixed[j] && w == 0.0);
         }
-        let mut pivots = [None; MOST_FRICTION];
-        // The second pass completes the first where rows share coordinates.
-        for pass in 0..2 {
-            let sticking = self.elements.iter().zip(modes.slips).filter(|(_, slip)| *slip == Slip::Stick);
-            for (nth, (element, _)) in sticking.enumerate() {
-                if pass == 0 {
-                    let free = (0..n)
-                        .filter(|&j| !is_stuck(j) && element.row[j] != 0.0 && !pivots.contains(&Some(j)));
-                    pivots[nth] = free.max_by(|&a, &b| element.row[a].abs().total_cmp(&element.row[b].abs()));
-                }
-                let Some(j) = pivots[nth] else { continue };
-                let others: f64 = (0..n).filter(|&k| k != j).map(|k| element.row[k] * y[n + k]).sum();
-                let speed = if is_tangent { 0.0 } else { element.speed };
-                y[n + j] = (speed - others) / element.row[j];
+        // Gaussian elimination: each row loses the pivots of the rows before it.
+        let mut reduced: Vec<(usize, Numbers, f64)> = Vec::new();
+        for (element, _) in self.elements.iter().zip(modes.slips).filter(|(_, slip)| *slip == Slip::Stick) {
+            let mut row: Numbers = std::array::from_fn(|j| if j < n { element.row[j] } else { 0.0 });
+            let mut speed = if is_tangent { 0.0 } else { element.speed };
+            let least = NO_MOBILITY * element.row.amax();
+            for (pivot, earlier, of_earlier) in &reduced {
+                let factor = row[*pivot] / earlier[*pivot];
+                row.iter_mut().zip(earlier).for_each(|(x, earlier)| *x -= factor * earlier);
+                (row[*pivot], speed) = (0.0, speed - factor * of_earlier);
             }
+            let free = (0..n).filter(|&j| !is_stuck(j) && row[j].abs() > least);
+            let pivot = free.max_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs()));
+            reduced.extend(pivot.map(|pivot| (pivot, row, speed)));
+        }
+        for (j, row, speed) in reduced.into_iter().rev() {
+            let others: f64 = (0..n).filter(|&k| k != j).map(|k| row[k] * y[n + k]).sum();
+            y[n + j] = (speed - others) / row[j];
         }
     }
 }

@@ -501,7 +501,8 @@ impl Flight {
         })
     }
 
-    /// Returns the first consistent modes: walls hold before they release, elements stick before they slide.
+    /// Returns the first consistent modes: walls hold or do not hold as now before they release or take over, elements stick before they
+    /// slide.
     fn consistent(&self, key: Key, at_rest: &AtRest, point: &PhasePoint) -> Option<Key> {
         let gaps: Vec<usize> = (0..MOST_GAPS).filter(|&gap| at_rest.gaps[gap].is_some()).collect();
         let elements: Vec<usize> = (0..MOST_FRICTION).filter(|&i| at_rest.elements[i]).collect();
@@ -510,7 +511,8 @@ impl Flight {
         sets.map(|(set, mut slide)| {
             let mut tried = key;
             for (at, &gap) in gaps.iter().enumerate() {
-                tried.held[gap] = at_rest.gaps[gap].filter(|_| set >> at & 1 == 0);
+                let stays = set >> at & 1 == 0;
+                tried.held[gap] = at_rest.gaps[gap].filter(|_| stays == key.held[gap].is_some());
             }
             for &i in elements.iter().rev() {
                 (tried.slides[i], tried.pieces[i]) = (Slide::ALL[slide % 3], 0);
