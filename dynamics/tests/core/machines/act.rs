@@ -1,5 +1,7 @@
 //! Changes of modes, state and tangents at events of a machine.
 
+use std::rc::Rc;
+
 use rattlemap_dynamics::model::{Contact, Side};
 
 use super::motion::{End, Event, Gap, Mode, Motion, Series, What, side_of, step_of};
@@ -40,8 +42,8 @@ impl Motion<'_> {
                 End::Bends(curve, _) => curve < self.grips.len() && self.rubs(curve, i),
                 _ => false,
             };
-            if !is_own {
-                self.break_series(i);
+            if !is_own && self.break_series(i) {
+                return;
             }
         }
         if let End::Bends(i, is_next) = end {
@@ -66,8 +68,11 @@ impl Motion<'_> {
                 Some((one, row))
             }
             End::Crosses(i, direction) => {
-                let events = self.events.len();
+                let (events, saved) = (self.events.len(), Rc::new((self.clone(), end)));
                 let reset = self.cross(i, direction, at_start);
+                if self.gaps[i].is_low && self.saved[i].is_none() {
+                    self.saved[i] = Some(saved);
+                }
                 jumps = self.events.len() > events;
                 reset.map(|reset| (reset, system.z[i].clone()))
             }
@@ -132,7 +137,6 @@ impl Motion<'_> {
     pub(super) fn change(&mut self, stage: usize) {
         let (grips, stuck, is_still) = (self.grips.clone(), self.stuck(), self.linear().is_still.clone());
         let before = self.modes();
-        (0..self.gaps.len()).for_each(|i| self.break_series(i));
         self.stage = stage;
         self.settle(&grips, &stuck, &is_still, None, true);
         for (before, _) in before.iter().zip(self.modes()).filter(|(before, after)| *before != after) {
@@ -194,7 +198,7 @@ impl Motion<'_> {
             let after = self.grips[i];
             if after != Grip::Stick && after != before && (before == Grip::Stick || cause == Some(i)) {
                 let is_in_series = |j: &usize| {
-                    matches!(self.gaps[*j].series, Series::Uncounted | Series::Low) && self.rubs(i, *j)
+                    self.gaps[*j].series == Series::Uncounted && self.rubs(i, *j)
                 };
                 if (0..self.gaps.len()).any(|j| is_in_series(&j)) {
                     continue;
@@ -511,22 +515,13 @@ impl Motion<'_> {
         let ends = before == Series::Short || is_slow;
         // The limit under friction along the gap is tested elsewhere.
         self.is_crowded |= reverses[0] && (presses && ends || lasts && whole > 1.0);
-        match before {
-            Series::Low => {}
-            Series::Uncounted => {
-                let what = if is_slow { What::Begins } else { What::Impact };
-                let t = self.time();
-                let uncounted = &mut self.gaps[i].uncounted;
-                if uncounted.iter().all(|(what, _)| *what == What::Impact) {
-                    uncounted.push((what, t));
-                }
-            }
-            _ => {
-                let what = if lasts || presses && ends { What::Begins } else { What::Impact };
-                self.record_as(i, what, side, symbol(&start.gaps[i], side));
-                let counted = if is_slow { What::Begins } else { What::Impact };
-                self.gaps[i].uncounted = vec![(counted, self.time())];
-            }
+        if before == Series::Uncounted {
+            let t = self.time();
+            self.gaps[i].uncounted.push(t);
+        } else {
+            let what = if lasts || presses && ends { What::Begins } else { What::Impact };
+            self.record_as(i, what, side, symbol(&start.gaps[i], side));
+            self.gaps[i].uncounted.clear();
         }
         let t = self.time() + later;
         if let Some(event) = self.events.iter_mut().rfind(|event| event.gap == i)
@@ -542,9 +537,12 @@ impl Motion<'_> {
                 let is_short = is_endless && later < SHORT_REST * self.linear().radian;
                 if is_short { Series::Short } else { Series::Long }
             }
-            Series::Low => Series::Low,
             _ => Series::Uncounted,
         };
+        self.gaps[i].is_low = self.gaps[i].series == Series::Uncounted && is_slow;
+        if self.gaps[i].series != Series::Uncounted {
+            self.saved[i] = None;
+        }
         if !lasts {
             self.leave(i, side, e == 0.0);
         } else if matches!(self.gaps[i].mode, Mode::Stuck(_)) {
@@ -570,26 +568,29 @@ impl Motion<'_> {
         along && slides <= SMALL * self.size_of_rate(&self.system.slides[element])
     }
 
-    /// Counts the impacts of a gap's series that have not been counted, because something else happens before their limit.
-    pub(super) fn break_series(&mut self, i: usize) {
+    /// Counts the impacts of a gap's series that have not been counted, because something else happens before their limit. If the last flights
+    /// were low, the motion goes back to them, as the gap comes to rest there. Returns whether it does.
+    pub(super) fn break_series(&mut self, i: usize) -> bool {
+        if let Some(saved) = self.saved[i].take() {
+            let end = saved.1;
+            self.clone_from(&saved.0);
+            self.break_series(i);
+            self.act(end, false);
+            return true;
+        }
         let uncounted = std::mem::take(&mut self.gaps[i].uncounted);
-        match self.gaps[i].series {
-            Series::Low => return,
-            Series::Uncounted => {}
-            _ => {
-                self.gaps[i].series = Series::Broken;
-                return;
+        if self.gaps[i].series == Series::Uncounted
+            && let Some(last) = self.events.iter_mut().rfind(|event| event.gap == i)
+        {
+            last.what = What::Impact;
+            let (side, symbol) = (last.side, Some(if last.side == Side::Right { b'2' } else { b'5' }));
+            for t in uncounted {
+                self.record_as(i, What::Impact, side, symbol);
+                self.events.last_mut().expect("the recorded event").t = t;
             }
         }
-        let is_low = uncounted.iter().any(|(what, _)| *what == What::Begins);
-        self.gaps[i].series = if is_low { Series::Low } else { Series::Broken };
-        let Some(last) = self.events.iter_mut().rfind(|event| event.gap == i) else { return };
-        last.what = uncounted[0].0;
-        let (side, symbol) = (last.side, Some(if last.side == Side::Right { b'2' } else { b'5' }));
-        for &(what, t) in &uncounted[1..] {
-            self.record_as(i, what, side, symbol);
-            self.events.last_mut().expect("the recorded event").t = t;
-        }
+        self.gaps[i].series = Series::Broken;
+        false
     }
 
     /// Whether an element reverses while a gap with this rate comes to rest in impacts: in each flight, or in some.

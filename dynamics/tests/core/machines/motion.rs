@@ -65,9 +65,11 @@ pub(super) struct Gap {
     pub(super) is_unpressed: bool,
     /// The wall of the last event.
     pub(super) origin: Option<Side>,
-    /// The stage of a series of impacts, and times of the impacts that it has not counted.
+    /// The stage of a series of impacts, times of the impacts that it has not counted, and whether flights are so low that the gap would rest
+    /// if the series were interrupted.
     pub(super) series: Series,
-    pub(super) uncounted: Vec<(What, f64)>,
+    pub(super) uncounted: Vec<f64>,
+    pub(super) is_low: bool,
 }
 
 /// Impacts are counted until the rest of their series is short. Then they are followed to the limit, which counts as one event. If something
@@ -80,8 +82,6 @@ pub(super) enum Series {
     /// The next impact is not counted.
     Short,
     Uncounted,
-    /// The flights are so low that the gap counts as at rest.
-    Low,
 }
 
 /// The end of a flight.
@@ -143,6 +143,8 @@ pub(crate) struct Motion<'a> {
     pub(crate) is_crowded: bool,
     /// Number of flights that impacts of other gaps would have begun, but that were too low.
     pub(crate) corners: usize,
+    /// For each gap, the motion before the impact after which flights are low.
+    pub(super) saved: Vec<Option<Rc<(Motion<'a>, End)>>>,
     /// Relative errors that are added to the velocities at events, one after the other.
     shaken: [f64; 4],
 }
@@ -188,6 +190,7 @@ impl<'a> Motion<'a> {
             origin: None,
             series: Series::Broken,
             uncounted: Vec::new(),
+            is_low: false,
         };
         let mut motion = Motion {
             system,
@@ -212,6 +215,7 @@ impl<'a> Motion<'a> {
             by_stage: [0; 2],
             corners: 0,
             is_crowded: false,
+            saved: vec![None; machine.gaps.len()],
             shaken: [0.0; 4],
         };
         motion.put(start);
@@ -502,7 +506,6 @@ impl<'a> Motion<'a> {
             }
         }
         self.run(system.period)?;
-        (0..self.gaps.len()).for_each(|i| self.break_series(i));
         self.periods += 1;
         self.begin_period();
         if let Some(stage) = at_end {
@@ -516,7 +519,15 @@ impl<'a> Motion<'a> {
         let (system, n) = (self.system, self.system.degrees);
         let mut events = 0u32;
         let (mut linear, mut flown) = (self.linear(), 0.0);
-        while self.t < until {
+        loop {
+            if self.t >= until {
+                self.move_tangents(&linear, std::mem::take(&mut flown));
+                if !(0..self.gaps.len()).any(|i| self.break_series(i)) {
+                    return Some(());
+                }
+                linear = self.linear();
+                continue;
+            }
             let (h, is_whole) = match until - self.t {
                 rest if rest <= linear.step.0 => (rest, false),
                 _ => (linear.step.0, true),
@@ -567,8 +578,6 @@ impl<'a> Motion<'a> {
                 return None;
             }
         }
-        self.move_tangents(&linear, flown);
-        Some(())
     }
 
     /// Advances the tangents by a time in a domain.
