@@ -197,9 +197,7 @@ impl Motion<'_> {
         for (i, &before) in before.iter().enumerate() {
             let after = self.grips[i];
             if after != Grip::Stick && after != before && (before == Grip::Stick || cause == Some(i)) {
-                let is_in_series = |j: &usize| {
-                    self.gaps[*j].series == Series::Uncounted && self.rubs(i, *j)
-                };
+                let is_in_series = |j: &usize| self.gaps[*j].series == Series::Uncounted && self.rubs(i, *j);
                 if (0..self.gaps.len()).any(|j| is_in_series(&j)) {
                     continue;
                 }

@@ -266,6 +266,19 @@ mod program {
         check_program(0..2_000, MACHINES, bent_case);
     }
 
+    /// A curve whose force at 0 had a rounding error, a tangent at a contact from rest, two sticking elements that share coordinates, and a
+    /// wall that took over from friction.
+    #[test]
+    fn machines_that_once_differed_agree_with_matrix_exponentials() {
+        for seed in [425, 447, 435, 416] {
+            let case = bent_case(seed);
+            let program = Program::new(&case.machine);
+            let mut theirs = Engine::new(&program, &case.machine, &case.start);
+            let found = compare_case(&case, MACHINES, &mut theirs).unwrap();
+            assert!(found.periods > 0, "{seed}");
+        }
+    }
+
     const SHAPES: [Shape; 6] = [
         PLAIN,
         Shape { harmonics: true, stages: true, ..PLAIN },
