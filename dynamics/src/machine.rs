@@ -13,8 +13,8 @@
 //!
 //! # Steps and events
 //!
-//! A step is a Taylor polynomial of order 23 from the present state, over at most 1.6 radians of the fastest rate, so that its remainder is
-//! below rounding. A mode ends at a root of a linear function of `a`, called a *watch*. Over one step, a watch is a polynomial of time. Its
+//! A step is a Taylor polynomial from the present state, of order 23 over at most 1.6 radians of the fastest rate and of lower order on
+//! shorter steps, so that its remainder is below rounding. Overdamped modes that have decayed do not count as the fastest rate. A mode ends at a root of a linear function of `a`, called a *watch*. Over one step, a watch is a polynomial of time. Its
 //! Bernstein coefficients show that it has no root, or isolate the first one. So no event is missed, at any step length.
 //!
 //! # Tangents
@@ -32,6 +32,7 @@ mod modes;
 mod motion;
 mod outputs;
 mod polynomial;
+mod slow;
 mod table;
 mod watch;
 

@@ -8,7 +8,7 @@ use wide::f64x4;
 use super::constraints::{Constraint, Constraints, NO_MOBILITY};
 use super::frame::Frame;
 use super::modes::{Pieces, signed};
-use super::polynomial::{ORDER, Polynomial, Weights, combine, rest, stretched};
+use super::polynomial::{MOST_REGISTERS, ORDER, Polynomial, REACHES, Weights, combine, registers_for};
 use super::{Numbers, PhasePoint, ROUNDING, SIZE, WIDTH};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::Slip;
@@ -35,29 +35,28 @@ pub(super) struct DomainKey {
     pub(super) pieces: Pieces,
 }
 
-/// A linear functional of a [`PhasePoint`], also called a row.
+/// A linear functional of a [`PhasePoint`], also called a row, and the number of SIMD registers that its factors occupy.
 #[derive(Clone, Debug)]
-pub(super) struct Functional(pub(super) PhasePoint);
-
-/// Number of SIMD registers that hold a point.
-const POINT_REGISTERS: usize = WIDTH / 4;
-
-fn registers(point: &PhasePoint) -> [f64x4; POINT_REGISTERS] {
-    std::array::from_fn(|i| f64x4::new(point.as_chunks().0[i]))
-}
+pub(super) struct Functional(pub(super) PhasePoint, usize);
 
 impl Functional {
-    pub(super) const ZERO: Functional = Functional([0.0; WIDTH]);
+    /// Returns the row 0 for points with `width` entries.
+    pub(super) fn zero(width: usize) -> Functional {
+        Functional([0.0; WIDTH], width.div_ceil(4))
+    }
 
-    pub(super) fn dot(&self, point: &PhasePoint) -> f64 {
+    pub(super) fn dot(&self, point: &[f64]) -> f64 {
         self.value_and_size(point)[0]
     }
 
     /// Returns the value at a point, and the sum of the moduli of its terms. Rounding errors are relative to this sum.
-    pub(super) fn value_and_size(&self, point: &PhasePoint) -> [f64; 2] {
-        let terms = registers(&self.0).into_iter().zip(registers(point)).map(|(row, point)| row * point);
-        let sums = terms.fold([f64x4::ZERO; 2], |[sum, size], term| [sum + term, size + term.abs()]);
-        sums.map(f64x4::reduce_add)
+    pub(super) fn value_and_size(&self, point: &[f64]) -> [f64; 2] {
+        let [mut sum, mut size] = [f64x4::ZERO; 2];
+        for (row, point) in self.0.as_chunks().0.iter().zip(point.as_chunks().0).take(self.1) {
+            let term = f64x4::new(*row) * f64x4::new(*point);
+            (sum, size) = (sum + term, size + term.abs());
+        }
+        [sum, size].map(f64x4::reduce_add)
     }
 
     /// Whether the value at a point is 0 within rounding.
@@ -67,7 +66,7 @@ impl Functional {
     }
 
     pub(super) fn scaled(&self, factor: f64) -> Functional {
-        Functional(self.0.map(|x| factor * x))
+        Functional(self.0.map(|x| factor * x), self.1)
     }
 
     /// Adds a constant.
@@ -88,12 +87,32 @@ pub(super) struct Path {
     /// Bounds on the changes of the coordinates.
     pub(super) changes: [f64; MOST_COORDINATES],
     h: f64,
+    /// Number of registers with coefficients.
+    pub(super) registers: usize,
 }
+
+/// The numbers from 1 on, and their inverses.
+const FACTORS: Polynomial = {
+    let (mut factors, mut k) = ([0.0; ORDER + 1], 0);
+    while k <= ORDER {
+        factors[k] = (k + 1) as f64;
+        k += 1;
+    }
+    factors
+};
+const INVERSES: Polynomial = {
+    let (mut inverses, mut k) = (FACTORS, 0);
+    while k <= ORDER {
+        inverses[k] = 1.0 / inverses[k];
+        k += 1;
+    }
+    inverses
+};
 
 /// One linear domain.
 #[derive(Clone, Debug)]
 pub(super) struct LinearDomain {
-    n: usize,
+    pub(super) n: usize,
     width: usize,
     /// Angular frequencies of the harmonics.
     rates: Vec<f64>,
@@ -113,8 +132,12 @@ pub(super) struct LinearDomain {
     pub(super) holds: [Option<Functional>; MOST_FRICTION],
     /// For each coordinate and each entry of the start point, a polynomial of the share of the longest step.
     tables: OnceLock<Vec<Polynomial>>,
-    /// Carries points over the longest step.
-    whole: OnceLock<Carrier>,
+    /// Carry points over [`REACHES`] of the longest step.
+    strides: [OnceLock<Carrier>; REACHES.len()],
+    /// The same equations for points in the slow subspace, if steps in it are much longer.
+    pub(super) slow: Option<Box<LinearDomain>>,
+    /// For equations in the slow subspace, the rates that are functions of the rest of the point.
+    pub(super) slaved: Vec<(usize, Functional)>,
 }
 
 impl Default for Path {
@@ -125,6 +148,7 @@ impl Default for Path {
             expanded: 0,
             changes: [0.0; MOST_COORDINATES],
             h: 0.0,
+            registers: MOST_REGISTERS,
         }
     }
 }
@@ -190,7 +214,9 @@ impl LinearDomain {
             *is_driven = left <= NO_MOBILITY * all;
         }
         let row = |matrix: &DMatrix<f64>, i: usize| {
-            Functional(std::array::from_fn(|j| if j < width { matrix[(i, j)] } else { 0.0 }))
+            let mut row = Functional::zero(width);
+            (0..width).for_each(|j| row.0[j] = matrix[(i, j)]);
+            row
         };
         let mut pushes = [const { None }; MOST_GAPS];
         let mut holds = [const { None }; MOST_FRICTION];
@@ -200,7 +226,7 @@ impl LinearDomain {
                 Constraint::Element(i_element) => holds[i_element] = Some(row(&multipliers, i)),
             }
         }
-        LinearDomain {
+        let mut domain = LinearDomain {
             n,
             width,
             rates: system.orders.iter().map(|order| order * system.machine.omega).collect(),
@@ -212,8 +238,28 @@ impl LinearDomain {
             pushes,
             holds,
             tables: OnceLock::new(),
-            whole: OnceLock::new(),
-        }
+            strides: [const { OnceLock::new() }; REACHES.len()],
+            slow: None,
+            slaved: Vec::new(),
+        };
+        let forced = system.machine.omega * f64::from(system.machine.highest_order());
+        domain.slow = domain.slowed(forced).map(Box::new);
+        domain
+    }
+
+    /// Returns the same equations with another longest step and other slaved rates.
+    pub(super) fn with_step(&self, unit: f64, slaved: Vec<(usize, Functional)>) -> LinearDomain {
+        let (tables, strides) = (OnceLock::new(), [const { OnceLock::new() }; REACHES.len()]);
+        LinearDomain { unit, slaved, tables, strides, slow: None, ..self.clone() }
+    }
+
+    /// Returns the largest ratio of the last coefficient in the tables and the largest one of the same polynomial.
+    pub(super) fn last_coefficient(&self) -> f64 {
+        let ratio = |c: &Polynomial| {
+            let size = c.iter().fold(0.0f64, |size, c| size.max(c.abs()));
+            if size == 0.0 { 0.0 } else { c[ORDER].abs() / size }
+        };
+        self.tables().flatten().map(ratio).fold(0.0, f64::max)
     }
 
     /// Returns the time in which the fastest rate turns by one radian.
@@ -223,9 +269,9 @@ impl LinearDomain {
 
     /// Returns the row of a coordinate, or of its rate.
     pub(super) fn unit_row(&self, entry: usize) -> Functional {
-        let mut row = [0.0; WIDTH];
-        row[entry] = 1.0;
-        Functional(row)
+        let mut row = Functional::zero(self.width);
+        row.0[entry] = 1.0;
+        row
     }
 
     /// Returns the time derivative of a point.
@@ -244,22 +290,22 @@ impl LinearDomain {
     /// Returns the time derivative of a functional along the motion, as a functional.
     pub(super) fn rate_of(&self, row: &Functional) -> Functional {
         let n = self.n;
-        let mut sums = [f64x4::ZERO; POINT_REGISTERS];
+        let mut rate = [0.0; WIDTH];
         for (acceleration, &factor) in self.accelerations.iter().zip(&row.0[n..]) {
             if factor != 0.0 {
-                let (terms, factor) = (registers(&acceleration.0), f64x4::splat(factor));
-                (0..POINT_REGISTERS).for_each(|i| sums[i] = terms[i].mul_add(factor, sums[i]));
+                let (sums, factor) = (rate.as_chunks_mut().0, f64x4::splat(factor));
+                for (sum, terms) in sums.iter_mut().zip(acceleration.0.as_chunks().0).take(acceleration.1) {
+                    *sum = f64x4::new(*terms).mul_add(factor, f64x4::new(*sum)).to_array();
+                }
             }
         }
-        let mut rate = [0.0; WIDTH];
-        rate.as_chunks_mut().0.iter_mut().zip(sums).for_each(|(rate, sum)| *rate = sum.to_array());
         rate[n..2 * n].iter_mut().zip(&row.0).for_each(|(rate, x)| *rate += x);
         for (k, omega) in self.rates.iter().enumerate() {
             let at = 2 * (n + k);
             rate[at] += omega * row.0[at + 1];
             rate[at + 1] -= omega * row.0[at];
         }
-        Functional(rate)
+        Functional(rate, self.width.div_ceil(4))
     }
 
     /// Finds the first derivative, of order `first` or higher, that is not 0 within rounding. Returns its order and value, or
@@ -304,7 +350,7 @@ impl LinearDomain {
             let mut row = self.unit_row(i);
             for k in 0..=ORDER {
                 table.iter_mut().zip(&row.0).for_each(|(column, x)| column[k] = *x);
-                row = self.rate_of(&row).scaled(self.unit / (k + 1) as f64);
+                row = self.slow_rate_of(&row).scaled(self.unit / (k + 1) as f64);
             }
         }
         tables
@@ -317,26 +363,39 @@ impl LinearDomain {
 
     /// Begins a step over a time `h` of at most the longest step.
     pub(super) fn begin(&self, point: &PhasePoint, h: f64, path: &mut Path) {
-        (path.point, path.h, path.expanded) = (*point, h, 0);
+        path.point[..self.width].copy_from_slice(&point[..self.width]);
+        (path.h, path.expanded, path.registers) = (h, 0, registers_for(h / self.unit));
     }
 
-    /// Expands the first `count` coordinates on a step, unless they are already expanded.
-    pub(super) fn expand(&self, path: &mut Path, count: usize) {
-        let part = path.h / self.unit;
-        for (i, table) in self.tables().enumerate().take(count).skip(path.expanded) {
-            let whole = combine(table, &path.point[..self.width]);
-            path.coordinates[i] = if path.h < self.unit { stretched(&whole, part) } else { whole };
-            path.changes[i] = rest(&path.coordinates[i]);
+    /// Expands the first `count` coordinates on a step, unless they are already expanded. The series may be shorter if only the first `share`
+    /// of the step matters.
+    pub(super) fn expand(&self, path: &mut Path, count: usize, share: f64) {
+        if path.expanded >= count {
+            return;
         }
-        path.expanded = path.expanded.max(count);
+        let part = path.h / self.unit;
+        let registers = if share == 1.0 { path.registers } else { registers_for(part * share) };
+        for (i, table) in self.tables().enumerate().take(count).skip(path.expanded) {
+            let (factors, coordinate) = (&path.point[..self.width], &mut path.coordinates[i]);
+            path.changes[i] = combine(table, factors, part, registers, coordinate);
+        }
+        path.expanded = count;
     }
 
     /// Writes the state at a share of a step. All coordinates must be expanded.
     pub(super) fn set_state(&self, y: &mut [f64], path: &Path, share: f64) {
-        let weights = Weights::at(share);
+        match registers_for(path.h / self.unit * share) {
+            3 => self.set_state_in::<3>(y, path, share),
+            4 => self.set_state_in::<4>(y, path, share),
+            _ => self.set_state_in::<MOST_REGISTERS>(y, path, share),
+        }
+    }
+
+    fn set_state_in<const R: usize>(&self, y: &mut [f64], path: &Path, share: f64) {
+        let (weights, per_time) = (Weights::<R>::at(share), 1.0 / path.h);
         for (i, coordinate) in path.coordinates.iter().enumerate().take(self.n) {
             let [value, slope] = weights.of(coordinate);
-            (y[i], y[self.n + i]) = (value, slope / path.h);
+            (y[i], y[self.n + i]) = (value, slope * per_time);
         }
     }
 
@@ -365,7 +424,8 @@ impl LinearDomain {
             }
             if row[n + i] != 0.0 {
                 let factor = row[n + i] / path.h;
-                (0..ORDER).for_each(|k| sum[k] += factor * (k + 1) as f64 * coordinate[k + 1]);
+                let terms = coordinate[1..].iter().zip(&FACTORS);
+                sum.iter_mut().zip(terms).for_each(|(sum, (c, k))| *sum += factor * k * c);
             }
         }
         for (k, omega) in self.rates.iter().enumerate() {
@@ -374,33 +434,48 @@ impl LinearDomain {
                 continue;
             }
             let [mut cos, mut sin] = [path.point[at], path.point[at + 1]];
-            for (k, sum) in sum.iter_mut().enumerate() {
+            let turn = omega * path.h;
+            for (sum, inverse) in sum[..4 * path.registers].iter_mut().zip(&INVERSES) {
                 *sum += row[at] * cos + row[at + 1] * sin;
-                let turn = omega * path.h / (k + 1) as f64;
+                let turn = turn * inverse;
                 (cos, sin) = (-turn * sin, turn * cos);
             }
         }
         sum
     }
 
-    /// Returns the carrier over the longest step.
-    pub(super) fn whole(&self) -> &Carrier {
-        self.whole.get_or_init(|| {
+    /// Returns the duration of a step over one of [`REACHES`].
+    pub(super) fn duration(&self, stride: usize) -> f64 {
+        REACHES[stride] * self.unit
+    }
+
+    /// Returns the carrier over one of [`REACHES`], if this is the time.
+    pub(super) fn whole(&self, stride: usize, time: f64) -> Option<&Carrier> {
+        let build = || {
             let mut carrier = Carrier::default();
-            self.set_carrier(&mut carrier, self.unit, self.width);
+            self.set_carrier(&mut carrier, time, self.width);
             carrier
-        })
+        };
+        (time == self.duration(stride)).then(|| self.strides[stride].get_or_init(build))
     }
 
     /// Fills a carrier with the changes of the first `count` unit vectors over a time up to the longest step.
     pub(super) fn set_carrier(&self, carrier: &mut Carrier, time: f64, count: usize) {
-        let (n, weights) = (self.n, Weights::at(time / self.unit));
+        match registers_for(time / self.unit) {
+            3 => self.set_carrier_in::<3>(carrier, time, count),
+            4 => self.set_carrier_in::<4>(carrier, time, count),
+            _ => self.set_carrier_in::<MOST_REGISTERS>(carrier, time, count),
+        }
+    }
+
+    fn set_carrier_in<const R: usize>(&self, carrier: &mut Carrier, time: f64, count: usize) {
+        let (n, weights, per_time) = (self.n, Weights::<R>::at(time / self.unit), 1.0 / self.unit);
         carrier.0.clear();
         carrier.0.resize(count, [0.0; SIZE]);
         for (i, table) in self.tables().enumerate() {
             for (change, column) in carrier.0.iter_mut().zip(table) {
                 let [value, slope] = weights.later(column);
-                (change[i], change[n + i]) = (value, slope / self.unit);
+                (change[i], change[n + i]) = (value, slope * per_time);
             }
         }
     }
@@ -413,14 +488,24 @@ pub(super) struct Carrier(Vec<Numbers>);
 impl Carrier {
     /// Applies the propagator to a point or to a tangent vector. Only the first `size` entries of the result are valid.
     pub(super) fn carry(&self, from: &[f64], size: usize) -> Numbers {
-        let mut image = [0.0; SIZE];
-        let parts = image.as_chunks_mut::<4>().0.iter_mut().zip(from.as_chunks().0).take(size.div_ceil(4));
-        for (part, (image, &start)) in parts.enumerate() {
-            let mut change = f64x4::ZERO;
-            for (column, &x) in self.0.iter().zip(from) {
-                change = f64x4::new(column.as_chunks().0[part]).mul_add(f64x4::splat(x), change);
-            }
-            *image = (f64x4::new(start) + change).to_array();
+        match size.div_ceil(4) {
+            1 => self.carried::<1>(from),
+            2 => self.carried::<2>(from),
+            3 => self.carried::<3>(from),
+            _ => self.carried::<{ SIZE / 4 }>(from),
+        }
+    }
+
+    #[inline(always)]
+    fn carried<const P: usize>(&self, from: &[f64]) -> Numbers {
+        let (mut image, mut changes) = ([0.0; SIZE], [f64x4::ZERO; P]);
+        for (column, &x) in self.0.iter().zip(from) {
+            let (parts, x) = (column.as_chunks().0, f64x4::splat(x));
+            (0..P).for_each(|part| changes[part] = f64x4::new(parts[part]).mul_add(x, changes[part]));
+        }
+        let starts = from.as_chunks().0.iter();
+        for ((image, start), change) in image.as_chunks_mut().0.iter_mut().zip(starts).zip(changes) {
+            *image = (f64x4::new(*start) + change).to_array();
         }
         image
     }

@@ -152,16 +152,16 @@ impl Flight<'_> {
 impl Frame {
     /// Returns the row of a displacement; 0 if the machine has no such displacement.
     fn displacement_row(&self, i: usize) -> Functional {
-        let mut row = [0.0; super::WIDTH];
+        let mut row = Functional::zero(self.width());
         if i < self.degrees() {
-            (0..self.n).for_each(|j| row[j] = self.from_flow[(i, j)]);
+            (0..self.n).for_each(|j| row.0[j] = self.from_flow[(i, j)]);
         }
-        Functional(row)
+        row
     }
 
     /// Returns the row of a signal in a domain.
     pub(super) fn signal_row(&self, signal: &Signal, domain: &LinearDomain) -> Functional {
-        let (n, mut row) = (self.n, Functional::ZERO);
+        let (n, mut row) = (self.n, Functional::zero(self.width()));
         let factors = |own: &DVector<f64>| self.from_flow.transpose() * own;
         row.0[..n].copy_from_slice(factors(&signal.displacement).as_slice());
         row.0[n..2 * n].copy_from_slice(factors(&signal.velocity).as_slice());
@@ -179,7 +179,7 @@ impl Frame {
     /// Returns the row of the force of a gap's compliant contacts, positive where it pushes.
     pub(super) fn compliant_force(&self, key: &DomainKey, gap: usize) -> Functional {
         let side = if key.engaged[gap] > 0 { Side::Right } else { Side::Left };
-        let (sign, mut row) = (side.sign(), Functional::ZERO);
+        let (sign, mut row) = (side.sign(), Functional::zero(self.width()));
         for wall in &self.walls(gap, side)[..usize::from(key.engaged[gap].unsigned_abs())] {
             let spring = wall.springs[key.stage];
             row.0[gap] += sign * spring.stiffness;

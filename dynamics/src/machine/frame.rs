@@ -342,14 +342,29 @@ impl Frame {
         point
     }
 
-    /// Sets cosine and sine of all harmonics of a point, at a time since phase 0.
+    /// Sets cosine and sine of all harmonics of a point, at a time since phase 0. Those of consecutive orders follow from products, whose
+    /// rounding errors are not larger than those of large angles.
     pub(super) fn set_phasors(&self, point: &mut PhasePoint, t: f64) {
-        let (phasors, _) = point[2 * self.n..].as_chunks_mut();
-        for (phasor, order) in phasors.iter_mut().zip(&self.orders) {
-            let (sin, cos) = (order * self.machine.omega * t).sin_cos();
-            *phasor = [cos, sin];
+        let (phasors, _) = point[2 * self.n..].as_chunks_mut::<2>();
+        let first = turned(self.machine.omega * t);
+        let mut last = (0.0, [1.0, 0.0]);
+        for (phasor, &order) in phasors.iter_mut().zip(&self.orders) {
+            let ([a, b], [c, d]) = (first, last.1);
+            *phasor = if order == last.0 + 1.0 {
+                [a * c - b * d, a * d + b * c]
+            } else {
+                turned(order * self.machine.omega * t)
+            };
+            last = (order, *phasor);
         }
     }
+}
+
+/// Returns cosine and sine. It is a function of its own, because the compiler would compute them where they are not needed.
+#[inline(never)]
+fn turned(angle: f64) -> [f64; 2] {
+    let (sin, cos) = angle.sin_cos();
+    [cos, sin]
 }
 
 /// Returns the inverse of a symmetric positive definite matrix.

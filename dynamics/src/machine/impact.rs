@@ -5,7 +5,7 @@ use super::domain::LinearDomain;
 use super::domains::System;
 use super::modes::{AtRest, GapMode, Modes};
 use super::{Numbers, PhasePoint, ROUNDING, SIZE};
-use crate::model::{Contact, MOST_GAPS, Side, Wall};
+use crate::model::{Contact, MOST_COORDINATES, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
 
 /// Height, relative to the scale of length, below which flights of a series of impacts are not computed: the gap comes to rest.
@@ -26,9 +26,9 @@ pub(super) struct Impact<'a> {
 
 /// The result of an impact.
 pub(super) struct Outcome {
-    /// Modes and point after the impact.
+    /// Modes and rates after the impact.
     pub(super) modes: Modes,
-    pub(super) point: PhasePoint,
+    pub(super) rates: [f64; MOST_COORDINATES],
     pub(super) lasts: bool,
     /// Acceleration towards the wall, in free motion after the impact, or its first derivative that is not 0.
     pub(super) pressing: f64,
@@ -57,9 +57,10 @@ impl Impact<'_> {
             let outcome = self.outcome_of(&kick);
             let low = (0..system.gaps()).filter(|&other| kick.1[other]).find(|&other| {
                 let GapMode::Stuck(side) = self.modes.gaps[other] else { return false };
-                let (domain, point) = (system.domain(&outcome.modes), &outcome.point);
-                side.sign() * domain.departure(other, point).1 > 0.0
-                    && -side.sign() * point[n + other] <= self.lowest_speed(domain, other, point)
+                let (domain, mut point) = (system.domain(&outcome.modes), *self.point);
+                point[n..2 * n].copy_from_slice(&outcome.rates[..n]);
+                side.sign() * domain.departure(other, &point).1 > 0.0
+                    && -side.sign() * point[n + other] <= self.lowest_speed(domain, other, &point)
             });
             match low {
                 Some(other) => kept[other] = true,
@@ -89,9 +90,9 @@ impl Impact<'_> {
         let domain = system.domain(&free);
         let pressing = side.sign() * domain.departure(gap, &bounced).1;
         let is_slow = leaving <= self.wall.mesh_speed.max(self.lowest_speed(domain, gap, &bounced));
-        let outcome = |modes, point, lasts, factor: f64| Outcome {
+        let outcome = |modes, point: &PhasePoint, lasts, factor: f64| Outcome {
             modes,
-            point,
+            rates: std::array::from_fn(|i| if i < n { point[n + i] } else { 0.0 }),
             lasts,
             pressing,
             jump: kick.map(|kick| kick * factor),
@@ -102,24 +103,24 @@ impl Impact<'_> {
             modes.gaps[gap] = GapMode::Stuck(side);
             let (held, fits) = self.slide_after_jump(&modes, kick, &stopped, Some(side));
             if fits && held.gaps[gap] == GapMode::Stuck(side) {
-                return outcome(held, stopped, true, 1.0);
+                return outcome(held, &stopped, true, 1.0);
             }
         } else if is_slow && pressing > 0.0 {
             let mut meshing = free;
             meshing.gaps[gap] = if leaving > 0.0 { GapMode::Onset(side) } else { GapMode::Pressed(side) };
             if side.sign() * system.domain(&meshing).departure(gap, &bounced).1 > 0.0 {
                 if leaving <= self.wall.mesh_speed || e >= 1.0 {
-                    return outcome(meshing, bounced, true, factor);
+                    return outcome(meshing, &bounced, true, factor);
                 }
                 // The rest of the series lasts `2 u / (G (1 - e))` for the leaving speed u and the pressing acceleration G. A flight with
                 // the speed `2 u / (1 - e)` ends at the same time, with the same momentum.
                 let longer = 2.0 / (1.0 - e);
                 let whole =
                     after(-side.sign() * (1.0 + longer * e) * self.approach, -side.sign() * longer * leaving);
-                return outcome(meshing, whole, true, 1.0 + longer * (e + slope * self.approach));
+                return outcome(meshing, &whole, true, 1.0 + longer * (e + slope * self.approach));
             }
         }
-        outcome(free, bounced, false, factor)
+        outcome(free, &bounced, false, factor)
     }
 
     /// Returns the kick while other gaps rest on rigid walls. A gap stays at rest if its wall pushes, or if it is in `kept`.
@@ -217,6 +218,9 @@ impl Impact<'_> {
             } else {
                 at_rest.elements[i] = modes.slips[i] == Slip::Stick;
             }
+        }
+        if at_rest == AtRest::default() && system.elements.is_empty() && system.springs.is_empty() {
+            return (modes, true);
         }
         modes.pieces = system.pieces_at(&modes.slips, point);
         match system.consistent(&modes, &at_rest, point) {

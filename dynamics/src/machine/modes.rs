@@ -57,6 +57,12 @@ pub(super) type Pieces = [u8; MOST_CURVES];
 pub(super) const MOST_CURVES: usize = MOST_FRICTION + MOST_SPRINGS;
 
 impl Modes {
+    /// Whether the modes are equal to others. Only the first `gaps` gaps are in use.
+    pub(super) fn are(&self, other: &Modes, gaps: usize) -> bool {
+        self.gaps[..gaps] == other.gaps[..gaps]
+            && (self.stage, self.slips, self.pieces) == (other.stage, other.slips, other.pieces)
+    }
+
     pub(super) fn key(&self, system: &Frame) -> DomainKey {
         let mut key = DomainKey {
             stage: self.stage,
@@ -105,6 +111,7 @@ impl Frame {
     }
 
     /// Returns side and index of the next wall in a direction from a gap.
+    #[inline]
     pub(super) fn wall_ahead(&self, modes: &Modes, gap: usize, direction: Side) -> Option<(Side, usize)> {
         let GapMode::Beyond(passed) = modes.gaps[gap] else { return None };
         let number = usize::from(passed.unsigned_abs());
@@ -140,7 +147,7 @@ impl Frame {
             spring.preload = Some(spring.force_at_wall() + force + sign * slope * wall.at);
             spring.stiffness += slope;
         }
-        let mut row = Functional::ZERO;
+        let mut row = Functional::zero(self.width());
         row.0[gap] = sign * spring.stiffness;
         row.0[self.n + gap] = sign * spring.damping;
         row.plus(spring.force_at_wall() - sign * spring.stiffness * wall.at, self.width())
@@ -148,7 +155,7 @@ impl Frame {
 
     /// Returns the row of an element's sliding rate.
     pub(super) fn rate_row(&self, i: usize) -> Functional {
-        let mut row = Functional::ZERO;
+        let mut row = Functional::zero(self.width());
         (0..self.n).for_each(|j| row.0[self.n + j] = self.elements[i].row[j]);
         row.plus(-self.elements[i].speed, self.width())
     }
@@ -173,7 +180,7 @@ impl Frame {
         let Some(spring) = i.checked_sub(MOST_FRICTION) else {
             return self.rate_row(i).scaled(slips[i].sign());
         };
-        let mut row = Functional::ZERO;
+        let mut row = Functional::zero(self.width());
         row.0[..self.n].copy_from_slice(self.springs[spring].row.as_slice());
         row
     }
@@ -188,7 +195,12 @@ impl Frame {
 
     /// Removes rounding errors from the rates of sticking elements and of gaps at rest, and from dependent gaps.
     pub(super) fn hold(&self, modes: &Modes, y: &mut [f64], is_tangent: bool) {
-        let n = self.n;
+        let (n, elements) = (self.n, self.elements.len());
+        let nothing_rests = modes.gaps[..self.gaps()].iter().all(|mode| mode.rest().is_none())
+            && modes.slips[..elements].iter().all(|slip| *slip != Slip::Stick);
+        if nothing_rests && self.ties.is_empty() {
+            return;
+        }
         let is_stuck = |j: usize| modes.gaps.get(j).is_some_and(|mode| mode.rest().is_some());
         (0..n).filter(|&j| is_stuck(j)).for_each(|j| y[n + j] = 0.0);
         if !self.ties.is_empty() {
@@ -210,21 +222,22 @@ impl Frame {
             return project(&mut y[n..2 * n], rows, |j, w| is_stuck(j) || fixed[j] && w == 0.0);
         }
         // Gaussian elimination: each row loses the pivots of the rows before it.
-        let mut reduced: Vec<(usize, Numbers, f64)> = Vec::new();
-        for (element, _) in self.elements.iter().zip(modes.slips).filter(|(_, slip)| *slip == Slip::Stick) {
+        let mut reduced: [Option<(usize, Numbers, f64)>; MOST_FRICTION] = [None; MOST_FRICTION];
+        let sticking = self.elements.iter().zip(modes.slips).filter(|(_, slip)| *slip == Slip::Stick);
+        for (nth, (element, _)) in sticking.enumerate() {
             let mut row: Numbers = std::array::from_fn(|j| if j < n { element.row[j] } else { 0.0 });
             let mut speed = if is_tangent { 0.0 } else { element.speed };
             let least = NO_MOBILITY * element.row.amax();
-            for (pivot, earlier, of_earlier) in &reduced {
+            for (pivot, earlier, of_earlier) in reduced.iter().flatten() {
                 let factor = row[*pivot] / earlier[*pivot];
                 row.iter_mut().zip(earlier).for_each(|(x, earlier)| *x -= factor * earlier);
                 (row[*pivot], speed) = (0.0, speed - factor * of_earlier);
             }
             let free = (0..n).filter(|&j| !is_stuck(j) && row[j].abs() > least);
             let pivot = free.max_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs()));
-            reduced.extend(pivot.map(|pivot| (pivot, row, speed)));
+            reduced[nth] = pivot.map(|pivot| (pivot, row, speed));
         }
-        for (j, row, speed) in reduced.into_iter().rev() {
+        for (j, row, speed) in reduced.into_iter().flatten().rev() {
             let others: f64 = (0..n).filter(|&k| k != j).map(|k| row[k] * y[n + k]).sum();
             y[n + j] = (speed - others) / row[j];
         }

@@ -15,8 +15,10 @@ use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;
 use super::modes::{MOST_CURVES, Modes};
-use super::watch::{Moment, Roots, Watch};
-use super::{Numbers, PhasePoint};
+use super::polynomial::{LEAST_REGISTERS, REACHES, registers_for};
+use super::slow::decaying_step;
+use super::watch::{First, Moment, Roots, Watch, Watches};
+use super::{Numbers, PhasePoint, ROUNDING};
 use crate::model::{MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, ON_WALL, Side};
 use crate::motion::{
     Allowance, Clock, EVENTS_PER_PERIOD_CAP, HUGE, Observer, Remark, STEPS_PER_PERIOD_CAP, Slip, Slips, Stop,
@@ -31,10 +33,11 @@ pub struct MachineMotion<'s> {
     /// Modes of the latest domain that was entered, and this domain.
     entered: Modes,
     domain: &'s LinearDomain,
-    /// Memory that is used again in each step: the step, the watches, and the carrier of tangents.
-    path: Option<Box<Path>>,
-    watches: Vec<Watch>,
+    /// Memory that is used again in each step.
+    memory: Option<Box<Memory>>,
     carrier: Carrier,
+    /// Which of the steps of different lengths is tried next.
+    stride: usize,
     /// State, harmonics and 1 at the present time.
     pub(super) point: PhasePoint,
     clock: Clock,
@@ -48,8 +51,8 @@ pub struct MachineMotion<'s> {
     has_slid: [bool; MOST_FRICTION],
     tangents: Vec<Numbers>,
     log_scale: f64,
-    /// Point before the event.
-    before: PhasePoint,
+    /// State before the event.
+    before: Numbers,
     /// For each impact of the event, the gap and minus the derivatives of the jumps of all rates with respect to the gap's rate.
     jumps: Vec<(usize, Numbers)>,
     events_in_period: u64,
@@ -62,6 +65,13 @@ pub struct MachineMotion<'s> {
     remark: Option<Remark>,
     work: Work,
     allowance: Allowance<'s>,
+}
+
+/// The step, and the watches since the last event. A box moves as one pointer.
+#[derive(Clone, Debug, Default)]
+struct Memory {
+    path: Path,
+    watches: Watches,
 }
 
 impl<'s> MachineMotion<'s> {
@@ -106,7 +116,7 @@ impl<'s> MachineMotion<'s> {
     }
 
     /// Returns the state of a point without the shifts at earlier phases 0.
-    fn unshifted(&self, point: &PhasePoint) -> Numbers {
+    fn unshifted(&self, point: &[f64]) -> Numbers {
         self.system.rigid_modes.shifted(self.system.to_state(point), &self.travelled)
     }
 
@@ -301,14 +311,40 @@ impl<'s> MachineMotion<'s> {
 
     /// Enters the domain of the present modes, and returns it.
     fn refresh(&mut self) -> &'s LinearDomain {
-        if self.modes != self.entered {
+        if !self.modes.are(&self.entered, self.system.gaps()) {
             (self.entered, self.domain) = (self.modes, self.system.domain(&self.modes));
         }
         self.domain
     }
 
+    /// Lists watches again at the next step.
+    fn forget_watches(&mut self) {
+        if let Some(memory) = &mut self.memory {
+            memory.watches.forget();
+        }
+    }
+
+    fn note_before(&mut self) {
+        let size = 2 * self.system.n;
+        self.before[..size].copy_from_slice(&self.point[..size]);
+    }
+
     fn rate(&self, gap: usize) -> f64 {
         self.point[self.system.n + gap]
+    }
+
+    /// Returns the equations for the next step. While fast overdamped modes decay, also returns how long the step may be.
+    fn pace(&mut self) -> (&'s LinearDomain, Option<f64>) {
+        let domain = self.refresh();
+        let Some(slow) = &domain.slow else { return (domain, None) };
+        let tangents = self.tangents.iter().map(|tangent| slow.excitation(tangent));
+        let excitation = tangents.fold(slow.excitation(&self.point), f64::max);
+        if excitation > ROUNDING {
+            return (domain, Some(decaying_step(excitation) * domain.unit));
+        }
+        slow.settle(&mut self.point);
+        self.tangents.iter_mut().for_each(|tangent| slow.settle(tangent));
+        (slow, None)
     }
 
     /// Takes one step, which ends at the first event, at the longest step or at the goal.
@@ -318,26 +354,37 @@ impl<'s> MachineMotion<'s> {
         if self.work.steps > self.allowance.steps || self.steps_in_period > STEPS_PER_PERIOD_CAP {
             return Err(Stop::TooStiff);
         }
-        let (system, domain, remaining) = (self.system, self.refresh(), self.clock.remaining(self.goal));
-        let h = domain.unit.min(remaining);
-        let (mut path, mut watches) =
-            (self.path.take().unwrap_or_default(), std::mem::take(&mut self.watches));
-        domain.begin(&self.point, h, &mut path);
-        let moment = self.moment();
-        moment.list(&mut watches);
-        let (first, touches) = moment.first_event(&watches, &mut path);
+        let (system, remaining) = (self.system, self.clock.remaining(self.goal));
+        let (domain, decaying) = self.pace();
+        let mut memory = self.memory.take().unwrap_or_default();
+        let Memory { path, watches } = &mut *memory;
+        self.moment().list(watches);
+        if !watches.are_distances() {
+            self.stride = REACHES.len() - 1;
+        }
+        let h = decaying.unwrap_or(domain.duration(self.stride)).min(remaining);
+        domain.begin(&self.point, h, path);
+        let First { share, number, touches } = Moment { domain, ..self.moment() }.first_event(watches, path);
         self.near_grazing |= touches;
-        let (share, time) = first.map_or((1.0, h), |(share, _)| (share, share * h));
+        let time = share * h;
         if share > 0.0 {
             if let Some(sums) = observer.sums() {
-                domain.expand(&mut path, system.n);
+                domain.expand(path, system.n, share);
                 let (modes, path, start) = (&self.modes, &*path, self.clock.time());
                 Flight { system, domain, modes, path, share, duration: time, start }.add_to(sums);
             }
-            self.advance(&mut path, share, time);
+            self.advance(domain, path, share, time);
         }
-        (self.path, self.watches) = (Some(path), watches);
-        if let Some((_, watch)) = first {
+        let event = number.map(|number| watches.watch(number));
+        if event.is_some() {
+            watches.forget();
+        }
+        self.memory = Some(memory);
+        self.stride = match event {
+            Some(_) => registers_for(2.0 * time / domain.unit) - LEAST_REGISTERS,
+            None => (self.stride + 1).min(REACHES.len() - 1),
+        };
+        if let Some(watch) = event {
             self.cross(watch, observer);
             return self.check_events();
         }
@@ -349,17 +396,18 @@ impl<'s> MachineMotion<'s> {
     }
 
     /// Advances state, tangents and clock to a share of a step.
-    fn advance(&mut self, path: &mut Path, share: f64, time: f64) {
-        let (system, domain, n) = (self.system, self.domain, self.system.n);
-        let before = self.point;
-        if time == domain.unit {
-            let end = domain.whole().carry(&before, 2 * n);
+    fn advance(&mut self, domain: &LinearDomain, path: &mut Path, share: f64, time: f64) {
+        let (system, n) = (self.system, self.system.n);
+        let mut before = [0.0; MOST_GAPS];
+        before[..system.gaps()].copy_from_slice(&self.point[..system.gaps()]);
+        if let Some(whole) = domain.whole(self.stride, time) {
+            let end = whole.carry(&self.point, 2 * n);
             self.point[..2 * n].copy_from_slice(&end[..2 * n]);
         } else {
-            domain.expand(path, n);
+            domain.expand(path, n, share);
             domain.set_state(&mut self.point, path, share);
         }
-        self.carry_tangents(time);
+        self.carry_tangents(domain, time);
         self.clock.advance(time);
         system.set_phasors(&mut self.point, self.clock.time());
         if !self.is_free() {
@@ -395,7 +443,7 @@ impl<'s> MachineMotion<'s> {
         if !self.system.ties.is_empty() {
             self.system.hold(&self.modes, &mut self.point, false);
         }
-        self.before = self.point;
+        self.note_before();
         self.jumps.clear();
         let linearised = row.map(|row| (row, self.domain.derivative(&self.point)));
         let energy = |motion: &Self| motion.system.energy(&motion.modes, &motion.point);

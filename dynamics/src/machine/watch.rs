@@ -1,9 +1,11 @@
 //! Watches: conditions that end the present modes, their functions, and the first root of all functions on a step.
 
-use super::domain::{Functional, LinearDomain, Path};
+use super::domain::{Functional, LinearDomain, Path, STAYS_ZERO};
 use super::frame::Frame;
 use super::modes::{GapMode, MOST_CURVES, Modes};
-use super::polynomial::{Fall, Polynomial, Weights, bernstein, first_fall};
+use super::polynomial::{
+    Fall, MOST_REGISTERS, ORDER, Polynomial, Weights, bernstein, first_fall, stays_positive,
+};
 use super::{PhasePoint, ROUNDING};
 use crate::model::{MOST_FRICTION, MOST_GAPS, Side, Wall};
 use crate::motion::{NO_SPEED, Slip};
@@ -54,6 +56,49 @@ impl Watch {
     }
 }
 
+/// Everything that may end the present modes. It stays the same as long as they do.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Watches {
+    /// Gap, position and direction of the wall of each watch that is a distance.
+    distances: Vec<(Watch, (usize, f64, Side))>,
+    /// The other watches and their functions.
+    rows: Vec<(Watch, Functional)>,
+    is_known: bool,
+}
+
+impl Watches {
+    /// Whether all watches are distances.
+    pub(super) fn are_distances(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Returns a watch by its number.
+    pub(super) fn watch(&self, number: usize) -> Watch {
+        match self.distances.get(number) {
+            Some((watch, _)) => *watch,
+            None => self.rows[number - self.distances.len()].0,
+        }
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.is_known = false;
+    }
+}
+
+/// The first event on a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct First {
+    /// Share of the step at which it happens; 1 without an event.
+    pub(super) share: f64,
+    /// Number of the watch that ends the modes.
+    pub(super) number: Option<usize>,
+    /// Whether a watch touched zero within rounding in a way that makes the linearisation unreliable.
+    pub(super) touches: bool,
+}
+
+/// Largest order of a root at the start of a step that the short series of a short step may have.
+const MOST_SHORT_ORDER: usize = 3;
+
 /// Roots of watches at the present instant. They are not events: the search for the next event divides them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Roots {
@@ -91,12 +136,21 @@ impl<'a> Moment<'a> {
             && rate() <= NO_SPEED * self.frame.speed
     }
 
-    /// Lists everything that may end the present modes, gap by gap.
-    pub(super) fn list(&self, watches: &mut Vec<Watch>) {
-        watches.clear();
+    /// Lists everything that may end the present modes, gap by gap, unless it is listed already.
+    pub(super) fn list(&self, watches: &mut Watches) {
+        if std::mem::replace(&mut watches.is_known, true) {
+            return;
+        }
+        watches.distances.clear();
+        watches.rows.clear();
+        let Watches { distances, rows, .. } = watches;
+        let mut push = |watch: Watch| match self.distance(watch) {
+            Some(distance) => distances.push((watch, distance)),
+            None => rows.push((watch, self.function(watch))),
+        };
         for gap in 0..self.frame.gaps() {
             if let GapMode::Stuck(side) = self.modes.gaps[gap] {
-                watches.push(Watch::PushEnds(gap, side));
+                push(Watch::PushEnds(gap, side));
                 continue;
             }
             if self.is_kept(gap) {
@@ -104,26 +158,31 @@ impl<'a> Moment<'a> {
             }
             match self.modes.gaps[gap] {
                 GapMode::Beyond(_) => {
-                    let ahead = |&side: &Side| self.frame.wall_ahead(self.modes, gap, side).is_some();
-                    watches.extend(Side::BOTH.into_iter().filter(ahead).map(|side| Watch::Wall(gap, side)));
+                    for side in Side::BOTH {
+                        if self.frame.wall_ahead(self.modes, gap, side).is_some() {
+                            push(Watch::Wall(gap, side));
+                        }
+                    }
                     let pushed = self.frame.pushed(self.modes, gap);
                     if let Some(side) =
                         pushed.filter(|&side| !self.frame.vanishes_at_wall(self.modes, gap, side))
                     {
-                        watches.push(Watch::ForceEnds(gap, side));
+                        push(Watch::ForceEnds(gap, side));
                     }
                 }
                 GapMode::Onset(side) => {
-                    watches.extend([Watch::OnsetEnds(gap, side), Watch::PressingEnds(gap, side)]);
+                    [Watch::OnsetEnds(gap, side), Watch::PressingEnds(gap, side)]
+                        .into_iter()
+                        .for_each(&mut push);
                     if self.behind(gap, side).is_some() {
-                        watches.push(Watch::Wall(gap, side.mirrored()));
+                        push(Watch::Wall(gap, side.mirrored()));
                     }
                 }
-                GapMode::Pressed(side) => watches.push(Watch::Leaves(gap, side)),
+                GapMode::Pressed(side) => push(Watch::Leaves(gap, side)),
                 GapMode::Open(side) => {
-                    watches.push(Watch::Leaves(gap, side));
+                    push(Watch::Leaves(gap, side));
                     if !self.frame.vanishes_at_wall(self.modes, gap, side) {
-                        watches.push(Watch::ForceBegins(gap, side));
+                        push(Watch::ForceBegins(gap, side));
                     }
                 }
                 GapMode::Stuck(_) => {}
@@ -132,11 +191,11 @@ impl<'a> Moment<'a> {
         for i in 0..self.frame.elements.len() {
             match self.modes.slips[i] {
                 Slip::Stick if self.domain.holds[i].is_some() => {
-                    watches.extend([Watch::Slips(i, Slip::Forward), Watch::Slips(i, Slip::Backward)]);
+                    [Slip::Forward, Slip::Backward].into_iter().for_each(|slip| push(Watch::Slips(i, slip)));
                 }
                 Slip::Stick => {}
                 _ if self.is_yielding(i) => {}
-                _ => watches.push(Watch::RateVanishes(i)),
+                _ => push(Watch::RateVanishes(i)),
             }
         }
         for (i, &piece) in self.modes.pieces.iter().enumerate() {
@@ -146,8 +205,7 @@ impl<'a> Moment<'a> {
                 && wall.is_none_or(|(gap, side)| self.frame.is_behind_last(self.modes, gap, side))
             {
                 let ends = [(piece > 0, false), (usize::from(piece) < curve.borders.len(), true)];
-                watches
-                    .extend(ends.into_iter().filter(|end| end.0).map(|(_, upper)| Watch::Border(i, upper)));
+                ends.into_iter().filter(|end| end.0).for_each(|(_, upper)| push(Watch::Border(i, upper)));
             }
         }
     }
@@ -161,6 +219,7 @@ impl<'a> Moment<'a> {
     }
 
     /// Returns the wall that a gap reaches in a direction.
+    #[inline]
     fn ahead(&self, gap: usize, direction: Side) -> Option<&'a Wall> {
         let (side, number) = match self.modes.gaps[gap] {
             GapMode::Onset(side) => self.behind(gap, side),
@@ -170,6 +229,7 @@ impl<'a> Moment<'a> {
     }
 
     /// Returns gap, position and direction of the wall if a watch is the distance of a gap from a wall.
+    #[inline]
     pub(super) fn distance(&self, watch: Watch) -> Option<(usize, f64, Side)> {
         match watch {
             Watch::Wall(gap, direction) => {
@@ -226,39 +286,56 @@ impl<'a> Moment<'a> {
         }
     }
 
-    /// Returns the first watch that ends the modes on a step, and the share of the step at which it does. Also returns whether a watch
-    /// touched zero within rounding in a way that makes the linearisation unreliable.
-    pub(super) fn first_event(&self, watches: &[Watch], path: &mut Path) -> (Option<(f64, Watch)>, bool) {
-        let gaps = self.frame.gaps();
-        let expanded = if watches.iter().all(|watch| watch.is_distance()) { gaps } else { self.frame.n };
-        self.domain.expand(path, expanded);
-        let (mut first, mut touches): (Option<(f64, Watch)>, bool) = (None, false);
-        let mut latest: Option<(usize, Polynomial)> = None;
-        for &watch in watches {
-            match self.fall(watch, path, &mut latest) {
-                Fall::None => {}
-                Fall::Touches => touches |= !self.is_harmless(watch),
-                Fall::At(share) if first.is_none_or(|(earliest, _)| share < earliest) => {
-                    first = Some((share, watch));
-                }
-                Fall::At(_) => {}
+    /// Returns the first event on a step.
+    pub(super) fn first_event(&self, watches: &Watches, path: &mut Path) -> First {
+        let has_high_order =
+            |at: &Option<(Side, usize)>| at.is_some_and(|(_, order)| order > MOST_SHORT_ORDER);
+        if !watches.rows.is_empty() || self.roots.at_wall.iter().any(has_high_order) {
+            path.registers = MOST_REGISTERS;
+        }
+        self.domain.expand(path, if watches.rows.is_empty() { self.frame.gaps() } else { self.frame.n }, 1.0);
+        let mut first = First { share: 1.0, number: None, touches: false };
+        let mut include = |number: usize, watch: Watch, fall: Fall| match fall {
+            Fall::None => {}
+            Fall::Touches => first.touches |= !self.is_harmless(watch),
+            Fall::At(share) if first.number.is_none() || share < first.share => {
+                (first.share, first.number) = (share, Some(number));
+            }
+            Fall::At(_) => {}
+        };
+        let mut latest = (MOST_GAPS, [0.0; ORDER + 1]);
+        for (number, (watch, distance)) in watches.distances.iter().enumerate() {
+            if let Some(fall) = self.fall_of_distance(*distance, path, &mut latest) {
+                include(number, *watch, fall);
             }
         }
-        (first, touches)
+        for (number, (watch, row)) in watches.rows.iter().enumerate() {
+            include(watches.distances.len() + number, *watch, self.fall_of_row(*watch, row, path));
+        }
+        first
     }
 
-    /// Returns where a watch ends the modes on a step. `latest` caches the Bernstein coefficients of a gap for further watches.
-    fn fall(&self, watch: Watch, path: &Path, latest: &mut Option<(usize, Polynomial)>) -> Fall {
-        let Some((gap, at, direction)) = self.distance(watch) else {
-            let row = self.function(watch);
-            let [_, size] = row.value_and_size(self.point);
-            let along = self.domain.along(&row, path);
-            let fall = first_fall(&along, None, self.order(watch, &row), size);
-            return match (watch, fall) {
-                (Watch::Slips(..), Fall::At(share)) => beyond_rounding(&along, share, size),
-                _ => fall,
-            };
-        };
+    /// Returns where the row of a watch falls below 0 on a step.
+    fn fall_of_row(&self, watch: Watch, row: &Functional, path: &Path) -> Fall {
+        let [_, size] = row.value_and_size(self.point);
+        let along = self.domain.along(row, path);
+        let order = self.order(watch, row);
+        match (watch, first_fall(&along, None, order, size, MOST_REGISTERS)) {
+            (Watch::Slips(..), Fall::At(share)) => beyond_rounding(&along, share, size),
+            // The force touches its limit at the start.
+            (Watch::Slips(..), Fall::None) if order > 1 && order != STAYS_ZERO => Fall::Touches,
+            (_, fall) => fall,
+        }
+    }
+
+    /// Returns where a gap reaches a wall on a step, unless a bound shows that it does not. `latest` keeps the Bernstein coefficients of a gap
+    /// for its other walls.
+    fn fall_of_distance(
+        &self,
+        (gap, at, direction): (usize, f64, Side),
+        path: &Path,
+        latest: &mut (usize, Polynomial),
+    ) -> Option<Fall> {
         let order = match self.roots.at_wall[gap] {
             Some((side, order)) if side == direction => order,
             _ => 0,
@@ -267,16 +344,18 @@ impl<'a> Moment<'a> {
         let size = at.abs() + self.point[gap].abs();
         let start = if order == 0 { sign * (at - self.point[gap]) } else { 0.0 };
         if order == 0 && start > change + ROUNDING * (change + size) {
-            return Fall::None;
+            return None;
         }
         let coordinate = &path.coordinates[gap];
-        let (_, coefficients) = match latest {
-            Some(known) if known.0 == gap => known,
-            _ => latest.insert((gap, bernstein(coordinate, 1))),
-        };
-        let (mut c, b) = (coordinate.map(|c| -sign * c), coefficients.map(|b| start - sign * b));
+        if latest.0 != gap {
+            *latest = (gap, bernstein(coordinate, 1, path.registers));
+        }
+        if order == 0 && stays_positive(&latest.1, start, -sign, path.registers) {
+            return None;
+        }
+        let (mut c, b) = (coordinate.map(|c| -sign * c), latest.1.map(|b| start - sign * b));
         c[0] = start;
-        first_fall(&c, Some(b), order, size)
+        Some(first_fall(&c, Some(&b), order, size, path.registers))
     }
 
     /// Whether the linearisation stays valid if the watch's function touches zero within rounding. At an elastic wall without a preload it
@@ -302,8 +381,10 @@ impl<'a> Moment<'a> {
 fn beyond_rounding(c: &Polynomial, share: f64, size: f64) -> Fall {
     let mut lifted = *c;
     lifted[0] = c[0].max(0.0) + ROUNDING * size;
-    match first_fall(&lifted, None, 0, size) {
-        Fall::At(later) if Weights::at(0.5 * (share + later)).of(c)[0] <= 0.0 => Fall::At(share),
+    match first_fall(&lifted, None, 0, size, MOST_REGISTERS) {
+        Fall::At(later) if Weights::<MOST_REGISTERS>::at(0.5 * (share + later)).of(c)[0] <= 0.0 => {
+            Fall::At(share)
+        }
         fall => fall,
     }
 }

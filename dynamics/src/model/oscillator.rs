@@ -133,17 +133,27 @@ impl Restitution {
 
     /// Returns the coefficient `e` and its derivative at an approach speed >= 0.
     pub fn at(&self, speed: f64) -> [f64; 2] {
-        let [constant, factor, power] = self.terms();
-        if factor == 0.0 {
-            return [constant.clamp(0.0, 1.0), 0.0];
+        match *self {
+            Restitution::BySpeed { constant, factor, power } if factor != 0.0 => {
+                by_speed([constant, factor, power], speed)
+            }
+            Restitution::Constant(constant) | Restitution::BySpeed { constant, .. } => {
+                [constant.clamp(0.0, 1.0), 0.0]
+            }
         }
-        let value = constant + factor * speed.powf(power);
-        let slope = factor * power * speed.powf(power - 1.0);
-        if (0.0..=1.0).contains(&value) && slope.is_finite() {
-            [value, slope]
-        } else {
-            [value.clamp(0.0, 1.0), 0.0]
-        }
+    }
+}
+
+/// Returns a coefficient of restitution and its derivative. It is a function of its own, because the compiler would compute the powers for
+/// constants, too.
+#[inline(never)]
+fn by_speed([constant, factor, power]: [f64; 3], speed: f64) -> [f64; 2] {
+    let value = constant + factor * speed.powf(power);
+    let slope = factor * power * speed.powf(power - 1.0);
+    if (0.0..=1.0).contains(&value) && slope.is_finite() {
+        [value, slope]
+    } else {
+        [value.clamp(0.0, 1.0), 0.0]
     }
 }
 

@@ -226,3 +226,50 @@ fn a_bar_that_falls_flat_on_two_supports_says_so() {
         assert_eq!(found, [tied; 2], "{inertia} {tilt}: {:?} {:?}", orbit.status, cell.status);
     }
 }
+
+/// A mass that a force drives against a light plate. Spring and damper connect the plate with another one, which dry friction holds.
+fn plates(mass: f64) -> Oscillator {
+    let vector = |entries: [f64; 3]| DVector::from_row_slice(&entries);
+    let between = |x: f64| DMatrix::from_row_slice(3, 3, &[0.0, 0.0, 0.0, 0.0, x, -x, 0.0, -x, x]);
+    let wall = Wall {
+        at: 0.0,
+        contact: Contact::Rigid,
+        restitution: Restitution::Constant(0.0),
+        mesh_speed: 0.0,
+        springs: vec![Spring::default()],
+    };
+    Oscillator {
+        omega: 1.0,
+        mass: DMatrix::from_diagonal(&vector([1.0, mass, mass])),
+        stages: vec![Forces {
+            damping: between(0.2),
+            stiffness: between(1.0),
+            load: vector([0.2, 0.0, 0.0]),
+        }],
+        drives: vec![Drive { order: 1, cos: vector([0.3, 0.0, 0.0]), sin: vector([0.0; 3]) }],
+        gaps: vec![GapRow { row: vector([1.0, -1.0, 0.0]), walls: [vec![wall], vec![]] }],
+        friction: vec![DryFriction::new(vector([0.0, 0.0, 1.0]), 1.0, 0.0)],
+        ..bar(1.0)
+    }
+}
+
+/// The motion of light plates tends to a limit, with errors proportional to their mass. They take no more steps than heavy ones.
+#[test]
+fn light_bodies_take_no_more_steps() {
+    let run = |mass: f64| {
+        let system = System::new(&plates(mass));
+        let mut motion = MachineMotion::new(&system, &REST);
+        motion.set_tangents(MachineMotion::unit_tangents(&system)[..2].to_vec());
+        (0..100).for_each(|_| motion.advance_period(&mut ()).unwrap());
+        (motion.state(), motion.derivative(), motion.work().steps)
+    };
+    let [(a, of_a, steps), (b, of_b, more), (c, of_c, most)] = [1e-4, 1e-5, 1e-6].map(run);
+    println!("steps {steps}, {more}, {most}");
+    assert!(steps < 6_000 && more <= steps && most <= more, "{steps}, {more}, {most}");
+    for i in [1, 2, 4] {
+        let ratio = (a[i] - b[i]) / (b[i] - c[i]);
+        assert!((ratio - 10.0).abs() < 0.1, "{ratio}");
+    }
+    let size = of_c.amax();
+    assert!((of_b.clone() - &of_c).amax() < 0.11 * (of_a - of_b).amax() + 1e-9 * size);
+}

@@ -205,7 +205,7 @@ impl MachineMotion<'_> {
         }
         let (modes, point) = (&self.modes, &self.point);
         let impact = Impact { system, modes, point, gap, side, wall, approach };
-        let Outcome { modes: next, point, lasts, pressing, jump } = impact.outcome();
+        let Outcome { modes: next, rates, lasts, pressing, jump } = impact.outcome();
         if !lasts && pressing <= 0.0 && approach < GRAZING_SPEED * system.speed {
             self.near_grazing = true;
         }
@@ -213,7 +213,7 @@ impl MachineMotion<'_> {
         if approach > 0.0 {
             self.jumps.push((gap, jump));
         }
-        self.point = point;
+        self.point[system.n..2 * system.n].copy_from_slice(&rates[..system.n]);
         let (kind, meshing) = if lasts {
             (EventKind::MeshStart, Some(side))
         } else {
@@ -228,7 +228,7 @@ impl MachineMotion<'_> {
             GapMode::Pressed(_) => self.leave(gap, side.mirrored()),
             _ => self.leave(gap, side),
         }
-        self.before = self.point;
+        self.note_before();
     }
 
     /// Whether another gap is about to have an impact, too, and the impact of the first gap changes its rate.
@@ -236,14 +236,14 @@ impl MachineMotion<'_> {
         let (system, rate) = (self.system, self.rate(other));
         let side = if rate > 0.0 { Side::Right } else { Side::Left };
         let m = |i, j| system.mobility[(i, j)];
-        let is_coupled = m(gap, other).abs() > ROUNDING * (m(gap, gap) * m(other, other)).sqrt();
-        is_coupled
-            && rate != 0.0
+        let is_coupled = || m(gap, other).abs() > ROUNDING * (m(gap, gap) * m(other, other)).sqrt();
+        rate != 0.0
             && system.wall_ahead(&self.modes, other, side).is_some_and(|(own, number)| {
                 let wall = &system.walls(other, own)[number];
                 let left = (wall.at - self.point[other]).abs();
                 own == side && !wall.contact.is_elastic() && left <= TIE * system.period * rate.abs()
             })
+            && is_coupled()
     }
 
     pub(super) fn count_event(&mut self) {
@@ -298,7 +298,7 @@ impl MachineMotion<'_> {
             code: of_wall + 4 * kind as u64 + 256 * (gap + 8 * wall) as u64,
             ends_series: false,
         };
-        observer.event(&event, &|| [&self.before, &self.point].map(|point| self.unshifted(point)));
+        observer.event(&event, &|| [&self.before[..], &self.point].map(|point| self.unshifted(point)));
     }
 
     /// Counts and reports a change of friction modes.

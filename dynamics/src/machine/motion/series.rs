@@ -1,7 +1,7 @@
 //! Series of impacts: a load presses the gap to its wall, infinitely many impacts happen in a finite time, and their rest is replaced by its
 //! limit.
 
-use super::MachineMotion;
+use super::{MachineMotion, Memory};
 use crate::machine::domain::LinearDomain;
 use crate::machine::flight::Flight;
 use crate::machine::impact::Impact;
@@ -100,6 +100,20 @@ impl<'s> MachineMotion<'s> {
             return None;
         }
         let (kick, let_go) = impact.joint_impact([false; MOST_GAPS]);
+        let closes = |pressing: [f64; 2]| {
+            let is_short = 2.0 * speed < CLOSING_ANGLE * free.radian() * pressing[0] * (1.0 - e);
+            let approach = speed * (pressing[1] / pressing[0]).sqrt();
+            let leaving = wall.restitution.at(approach)[0] * approach;
+            // The next impact would be the last one, see `Impact::outcome`.
+            let is_last = leaving <= lowest && wall.mesh_speed < leaving;
+            let_go == [false; MOST_GAPS] && pressing[1] > 0.0 && (is_last || is_endless && is_short)
+        };
+        let row = &free.accelerations[gap];
+        let damping = -(0..n).map(|i| row.0[n + i] * kick[i]).sum::<f64>();
+        // Without friction, the acceleration of the stopped gap is the same on the way back.
+        if system.elements.is_empty() && !closes([s * row.dot(&point) - speed * damping; 2]) {
+            return None;
+        }
         let rest = Rest { pressing: [0.0; 2], change: 0.0, damping: 0.0, restitution: &wall.restitution };
         let mut held = modes;
         held.gaps[gap] = GapMode::Stuck(side);
@@ -119,21 +133,19 @@ impl<'s> MachineMotion<'s> {
                 return None;
             }
         }
-        let back = system.domain(&Modes { slips: series.back, ..modes });
+        let back = if series.back == modes.slips {
+            free
+        } else {
+            system.domain(&Modes { slips: series.back, ..modes })
+        };
         let pressing = [free, back].map(|domain| s * domain.accelerations[gap].dot(&stopped));
-        let is_short = 2.0 * speed < CLOSING_ANGLE * free.radian() * pressing[0] * (1.0 - e);
-        let approach = speed * (pressing[1] / pressing[0]).sqrt();
-        let leaving = wall.restitution.at(approach)[0] * approach;
-        // The next impact would be the last one, see `Impact::outcome`.
-        let is_last = leaving <= lowest && wall.mesh_speed < leaving;
-        if let_go != [false; MOST_GAPS] || !(pressing[1] > 0.0 && (is_last || is_endless && is_short)) {
+        if !closes(pressing) {
             return None;
         }
-        let row = &free.accelerations[gap];
         series.at_rest = system.domain(&series.held);
         series.rest.pressing = pressing;
         series.rest.change = s * series.at_rest.rate_of(row).dot(&stopped);
-        series.rest.damping = -(0..n).map(|i| row.0[n + i] * kick[i]).sum::<f64>();
+        series.rest.damping = damping;
         series.time = series.rest.duration(speed, 0.0);
         (series.time < self.clock.remaining(self.goal).min(series.at_rest.unit)).then_some(series)
     }
@@ -151,27 +163,28 @@ impl<'s> MachineMotion<'s> {
     pub(super) fn close_series(&mut self, gap: usize, side: Side, observer: &mut dyn Observer) {
         let Some(series) = self.series(gap, side) else { return };
         let (system, n, modes, start) = (self.system, self.system.n, self.modes, self.point);
-        let (mut path, mut watches) =
-            (self.path.take().unwrap_or_default(), std::mem::take(&mut self.watches));
+        let mut memory = self.memory.take().unwrap_or_default();
+        let Memory { path, watches } = &mut *memory;
         self.modes = series.held;
         self.refresh();
         series.stop(&mut self.point, n, gap);
-        series.at_rest.begin(&self.point, series.time, &mut path);
+        series.at_rest.begin(&self.point, series.time, path);
         let moment = self.moment();
-        moment.list(&mut watches);
-        if moment.first_event(&watches, &mut path) == (None, false) {
-            series.at_rest.expand(&mut path, n);
+        watches.forget();
+        moment.list(watches);
+        let first = moment.first_event(watches, path);
+        if first.number.is_none() && !first.touches {
+            series.at_rest.expand(path, n, 1.0);
             if let Some(sums) = observer.sums() {
                 let [before, after] = [start, self.point].map(|point| system.energy(&modes, &point));
                 sums.lost.add(before, after);
                 sums.gaps[gap].lost.add(before, after);
                 let (domain, duration, start) = (series.at_rest, series.time, self.clock.time());
-                Flight { system, domain, modes: &modes, path: &path, share: 1.0, duration, start }
-                    .add_to(sums);
+                Flight { system, domain, modes: &modes, path, share: 1.0, duration, start }.add_to(sums);
             }
             let (late, scale) = (self.begin_rest(gap, side, &series, &start), self.log_scale);
             let times = (self.contact_time, self.sticking_time);
-            self.advance(&mut path, 1.0, series.time);
+            self.advance(series.at_rest, path, 1.0, series.time);
             (self.contact_time, self.sticking_time) = times;
             self.modes = modes;
             let ends = series.at_rest.derivative(&self.point);
@@ -185,7 +198,8 @@ impl<'s> MachineMotion<'s> {
         } else {
             (self.modes, self.point) = (modes, start);
         }
-        (self.path, self.watches) = (Some(path), watches);
+        watches.forget();
+        self.memory = Some(memory);
     }
 
     /// Carries the tangents from the last impact to the motion of a gap at rest. For each, returns how much later the series of the
@@ -223,7 +237,7 @@ impl<'s> MachineMotion<'s> {
         // The sliding that reversed in each flight ends, or reverses once more.
         self.modes.slips = series.back;
         rubs.iter().for_each(|&i| self.record_slip(i, SlipKind::Reversal, observer));
-        self.before = self.point;
+        self.note_before();
         self.jumps.clear();
         self.record(gap, EventKind::MeshStart, side, last, Some(side), observer);
         if !is_rigid {

@@ -93,10 +93,26 @@ impl MachineMotion<'_> {
         at_rest
     }
 
+    /// Whether a mode depends on forces: of friction, of a gap at rest, of a contact onset, or at a wall that only pushes.
+    fn depends_on_forces(&self) -> bool {
+        let of_gap = |gap: usize| match self.modes.gaps[gap] {
+            GapMode::Pressed(_) => false,
+            GapMode::Beyond(_) => {
+                self.roots.at_wall[gap].is_some() && self.moment().is_kept(gap)
+                    || self.system.pushed(&self.modes, gap).is_some()
+            }
+            _ => true,
+        };
+        !self.system.elements.is_empty() || (0..self.system.gaps()).any(of_gap)
+    }
+
     /// Decides all modes that depend on forces again, after a jump of forces or rates. The modes in `exempt` have just been decided.
     pub(super) fn settle(&mut self, exempt: &AtRest, observer: &mut dyn Observer) {
         for _ in 0..MOST_DECISIONS {
             self.refresh();
+            if !self.depends_on_forces() {
+                break;
+            }
             if self.settle_pushing(observer) {
                 continue;
             }
@@ -233,7 +249,8 @@ impl MachineMotion<'_> {
     pub(super) fn enter_stage(&mut self, stage: usize, observer: &mut dyn Observer) {
         let before = self.modes.key(self.system);
         self.modes.stage = stage;
-        self.before = self.point;
+        self.note_before();
+        self.forget_watches();
         self.refresh();
         self.settle(&AtRest::default(), observer);
         if let Some(sums) = observer.sums() {

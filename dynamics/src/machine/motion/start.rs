@@ -4,7 +4,7 @@ use super::MachineMotion;
 use crate::machine::domain::Carrier;
 use crate::machine::modes::{AtRest, GapMode, Modes, Pieces, signed};
 use crate::machine::watch::Roots;
-use crate::machine::{Numbers, System};
+use crate::machine::{Numbers, SIZE, System};
 use crate::model::{Contact, MOST_COORDINATES, MOST_FRICTION, MOST_GAPS, Side};
 use crate::motion::{Allowance, Clock, Observer, Work};
 use crate::motion::{Slip, Slips};
@@ -39,8 +39,8 @@ impl<'s> MachineMotion<'s> {
             modes,
             entered: modes,
             domain: system.domain(&modes),
-            path: None,
-            watches: Vec::new(),
+            memory: None,
+            stride: 0,
             carrier: Carrier::default(),
             point,
             clock: Clock::default(),
@@ -52,7 +52,7 @@ impl<'s> MachineMotion<'s> {
             has_slid: [false; MOST_FRICTION],
             tangents: Vec::new(),
             log_scale: 0.0,
-            before: point,
+            before: [0.0; SIZE],
             jumps: Vec::new(),
             events_in_period: 0,
             steps_in_period: 0,
@@ -64,6 +64,7 @@ impl<'s> MachineMotion<'s> {
             work: Work::default(),
             allowance: Allowance::UNLIMITED,
         };
+        motion.note_before();
         motion.enter();
         motion
     }
@@ -111,6 +112,7 @@ impl<'s> MachineMotion<'s> {
 
     fn take_modes(&mut self, carried: &CarriedModes) {
         let (system, modes) = (self.system, &carried.modes);
+        self.forget_watches();
         self.origin = carried.origin;
         for gap in 0..system.gaps() {
             let mode = modes.gaps[gap];

@@ -1,9 +1,10 @@
 //! Tangent vectors of a motion.
 
 use nalgebra::DMatrix;
+use wide::f64x4;
 
 use super::MachineMotion;
-use crate::machine::domain::{Carrier, Functional};
+use crate::machine::domain::{Carrier, Functional, LinearDomain};
 use crate::machine::watch::Watch;
 use crate::machine::{Numbers, PhasePoint, SIZE, System};
 use crate::motion::NO_SPEED;
@@ -43,21 +44,22 @@ impl MachineMotion<'_> {
     }
 
     /// Carries the tangents along a part of a step.
-    pub(super) fn carry_tangents(&mut self, time: f64) {
+    pub(super) fn carry_tangents(&mut self, domain: &LinearDomain, time: f64) {
         if self.tangents.is_empty() {
             return;
         }
-        let (domain, size) = (self.domain, 2 * self.system.n);
+        let size = 2 * self.system.n;
         let carry = |tangents: &mut [Numbers], carrier: &Carrier| {
             tangents.iter_mut().for_each(|tangent| *tangent = carrier.carry(tangent, size));
         };
-        if time == domain.unit {
-            carry(&mut self.tangents, domain.whole());
+        if let Some(whole) = domain.whole(self.stride, time) {
+            carry(&mut self.tangents, whole);
         } else {
             domain.set_carrier(&mut self.carrier, time, size);
             carry(&mut self.tangents, &self.carrier);
         }
-        let size = self.tangents.iter().flatten().fold(0.0f64, |size, x| size.max(x.abs()));
+        let sizes = self.tangents.iter().flat_map(|tangent| tangent.as_chunks().0);
+        let size = sizes.fold(f64x4::ZERO, |size, &x| size + f64x4::new(x).abs()).reduce_add();
         if size > 0.0 && size.is_finite() && !(1.0 / LARGEST_TANGENT..LARGEST_TANGENT).contains(&size) {
             self.log_scale += size.ln();
             self.tangents.iter_mut().flatten().for_each(|x| *x /= size);

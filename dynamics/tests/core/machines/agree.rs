@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::engine::{Follower, Period};
 use super::motion::{Event, Motion, What};
-use super::random::{Case, any_case, apart, bent_case, dependent_case};
+use super::random::{Case, any_case, apart, bent_case, dependent_case, light_case};
 use super::system::{ANGLE, System};
 use crate::independent::random::{self as one_gap, PLAIN, Shape};
 
@@ -247,6 +247,11 @@ mod program {
     #[test]
     fn machines_with_dependent_gaps_agree_with_matrix_exponentials() {
         check_program(0..40, MACHINES, dependent_case);
+    }
+
+    #[test]
+    fn machines_with_light_bodies_agree_with_matrix_exponentials() {
+        check_program(0..40, MACHINES, light_case);
     }
 
     #[test]

@@ -365,6 +365,19 @@ pub(crate) fn any_case(seed: u64) -> Case {
     case(seed, SHAPES[(seed % SHAPES.len() as u64) as usize])
 }
 
+/// Returns a machine with a light body on dampers, which has overdamped modes.
+pub(crate) fn light_case(seed: u64) -> Case {
+    let mut case = any_case(seed);
+    let (machine, n) = (&mut case.machine, case.start.len() / 2);
+    let light = seed as usize % n;
+    machine.mass.row_mut(light).scale_mut(0.1);
+    machine.mass.column_mut(light).scale_mut(0.1);
+    for forces in &mut machine.stages {
+        forces.damping[(light, light)] += 2.0;
+    }
+    case
+}
+
 /// Returns the machine of a seed: in turn one that drifts, a symmetric one, and any.
 pub(crate) fn structured_case(seed: u64) -> Case {
     let shape = STRUCTURED[(seed / 3 % STRUCTURED.len() as u64) as usize];
