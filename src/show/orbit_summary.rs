@@ -111,7 +111,7 @@ fn state(model: &dyn Model, instant: Instant) -> String {
 }
 
 /// Returns what the period of a model is.
-pub fn timing(model: &dyn Model) -> Timing {
+fn timing(model: &dyn Model) -> Timing {
     model.oscillator().map_or(Timing::Forced, |oscillator| oscillator.timing)
 }
 

@@ -64,36 +64,6 @@ frequency = "omega"
 gap = [1, -1]
 "#;
 
-/// A mass that a load and a force push over the ground. The gap has no walls.
-const SLIDER: &str = r#"
-name = "slider"
-parameters = { c = 0.5, load = 0.3, f = 0.2 }
-friction = [{ force = "f" }]
-[motion]
-coordinates = ["x"]
-mass = [[1]]
-damping = [["c"]]
-load = ["load"]
-force = [1]
-frequency = 1
-gap = [1]
-"#;
-
-/// Two bodies on a spring, which a load pushes against friction.
-const PUSHED: &str = r#"
-name = "pushed"
-parameters = { load = 2.0, other = 0.0, f = 1.0, g = 0.0 }
-friction = [{ row = [0, 1], force = "f" }, { row = [1, 1], force = "g" }]
-[motion]
-coordinates = ["a", "b"]
-mass = [[1, 0], [0, 1]]
-damping = [[0.1, -0.1], [-0.1, 0.1]]
-stiffness = [[1, -1], [-1, 1]]
-load = ["load", "other"]
-time_scale = 5
-gap = [1, -1]
-"#;
-
 fn model(text: &str) -> FileModel {
     FileModel::parse(text, "model.toml").unwrap()
 }
@@ -216,79 +186,6 @@ fn a_conserved_momentum_decides_the_mean_speed_and_a_load_accelerates() {
     assert_eq!((found.class, found.status), (Class::Undecided, Status::Accelerates));
 }
 
-/// Where dampers do not act, a load beyond all friction accelerates the motion, and a smaller one does not.
-#[test]
-fn a_load_beyond_friction_accelerates() {
-    let mut slider = model(SLIDER);
-    for (damping, load, accelerates) in
-        [(0.0, 0.3, true), (0.0, -0.3, true), (0.0, 0.1, false), (0.5, 0.3, false)]
-    {
-        (slider.set("c", damping).unwrap(), slider.set("load", load).unwrap());
-        let found = orbit(&slider, REST);
-        assert_eq!(found.status == Status::Accelerates, accelerates, "{damping} {load}: {found:?}");
-        assert_eq!(found.class == Class::Undecided, accelerates, "{damping} {load}: {found:?}");
-    }
-    let mut pushed = model(PUSHED);
-    let found = orbit(&pushed, REST);
-    assert_eq!((found.class, found.status), (Class::Undecided, Status::Accelerates));
-    // Only the sum of the loads counts, and friction opposes it with f + 2 g.
-    for (load, g, accelerates) in [(2.0, 0.4, true), (2.0, 0.6, false), (0.9, 0.0, false)] {
-        (pushed.set("load", load).unwrap(), pushed.set("g", g).unwrap());
-        assert_eq!(pushed.oscillator().unwrap().rigid_modes().accelerates, accelerates, "{load} {g}");
-    }
-    // Friction that falls holds the load at rest, but not a fast motion.
-    let text = SLIDER
-        .replace("force = \"f\"", "force_at_speed = [[0, 0.4], [0.5, 0.2]]")
-        .replace("force = [1]", "time_scale = 6")
-        .replace("frequency = 1\n", "");
-    let mut falling = model(&text);
-    falling.set("c", 0.0).unwrap();
-    for (speed, class) in [(0.1, Class::Periodic { period: 1 }), (2.0, Class::Undecided)] {
-        let found = orbit(&falling, state(&[0.0, speed]));
-        assert_eq!(found.class, class, "{speed}: {found:?}");
-    }
-    // Without the spring, friction holds the loads where |other - load| <= 1 and |load| <= 1.
-    let loose = PUSHED
-        .replace("stiffness = [[1, -1], [-1, 1]]\n", "")
-        .replace("[[0.1, -0.1], [-0.1, 0.1]]", "[[0, 0], [0, 0]]");
-    let mut loose = model(&loose);
-    loose.set("g", 1.0).unwrap();
-    for (load, other, accelerates) in
-        [(0.95, 1.9, false), (0.5, 1.9, true), (1.2, 0.5, true), (-0.9, 0.2, true)]
-    {
-        (loose.set("load", load).unwrap(), loose.set("other", other).unwrap());
-        assert_eq!(loose.oscillator().unwrap().rigid_modes().accelerates, accelerates, "{load} {other}");
-    }
-}
-
-/// A gap without walls hits nothing, so it may move with its mode.
-#[test]
-fn a_gap_without_walls_may_drift() {
-    let second = [
-        ("\"x\"]", "\"x\", \"dummy\"]"),
-        ("[[1]]", "[[1, 0], [0, 1]]"),
-        ("damping = [[\"c\"]]", "damping = [[\"c\", 0], [0, 1]]\nstiffness = [[0, 0], [0, 1]]"),
-        ("[\"load\"]", "[\"load\", 0]"),
-        ("force = [1]", "force = [1, 0]"),
-        ("gap = [1]", "gap = [0, 1]"),
-        ("force = \"f\"", "row = [1, 0], force = \"f\""),
-    ];
-    let with_second = second.iter().fold(SLIDER.to_owned(), |text, (from, to)| text.replace(from, to));
-    for gap in ["[0, 1]", "[1, 0]", "[-2, 0.7]"] {
-        let slider = model(&with_second.replace("gap = [0, 1]", &format!("gap = {gap}")));
-        check_slider(&slider);
-    }
-    check_slider(&model(SLIDER));
-}
-
-fn check_slider(slider: &FileModel) {
-    let orbit = orbit(slider, REST);
-    assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok));
-    let drift = displacement(&orbit, 0).drift.unwrap();
-    assert!((drift - 0.444_517).abs() < 1e-6, "{drift}");
-    check_samples(slider, &orbit);
-}
-
 /// The judge shifts states back like the engines, and leaves out the same multipliers.
 #[test]
 fn maps_that_drift_are_judged() {
@@ -297,7 +194,6 @@ fn maps_that_drift_are_judged() {
         (CAPSULE, [("omega", 0.9..=1.3), ("a", 0.7..=1.1)]),
         (DRIVELINE, [("omega", 1.5..=2.5), ("T", 0.3..=0.6)]),
         (FREE, [("omega", 1.4..=2.0), ("k", 1.5..=2.5)]),
-        (SLIDER, [("c", 0.4..=0.8), ("load", 0.2..=0.4)]),
     ] {
         let [(x, xs), (y, ys)] = axes;
         let scene = Scene::builder(model(text)).axis(x, xs, 3).axis(y, ys, 2).build().unwrap();
@@ -308,7 +204,7 @@ fn maps_that_drift_are_judged() {
         let of = |id: usize| independent::record(&plan, id as u32, &records).filter(|judge| judge.period > 0);
         judged += (0..records.len()).filter_map(of).count();
     }
-    assert!(judged >= 15, "{judged} of 24 cells have a period for the judge");
+    assert!(judged >= 9, "{judged} of 18 cells have a period for the judge");
 }
 
 #[test]
