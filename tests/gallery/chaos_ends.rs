@@ -29,7 +29,6 @@ fn both(f: f64, a: f64) -> [Measurement; 2] {
 /// Rounding decides how long the chaos of a cell lasts.
 #[test]
 fn a_tube_is_not_called_chaotic_before_its_ball_rests() {
-    let mut late = 0;
     for (f, a) in [
         (14.59322033898305, 23.02127659574468),
         (11.94915254237288, 24.638297872340427),
@@ -42,9 +41,7 @@ fn a_tube_is_not_called_chaotic_before_its_ball_rests() {
         assert!(whole.period.is_some_and(|period| period < 12), "f = {f}, a = {a}: {whole:?}");
         assert_eq!((of(&early), of(&early).1), (of(&whole), Some(0.0)), "f = {f}, a = {a}");
         assert!(early.periods_run < 528, "f = {f}, a = {a}: {}", early.periods_run);
-        late += u32::from(early.periods_run >= 200);
     }
-    assert!(late >= 2, "{late}");
 }
 
 /// The ball rests again and again, more than `max_period` apart. Such a motion needs no further periods.
