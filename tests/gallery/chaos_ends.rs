@@ -25,22 +25,23 @@ fn both(f: f64, a: f64) -> [Measurement; 2] {
     [true, false].map(|early_stop| measure(&flow, tube.law(), REST, &budget(early_stop)))
 }
 
-/// The motion is chaotic, in some cells for more than 198 periods. Then a series of impacts closes, and a superstable cycle follows.
-/// Rounding decides how long the chaos of a cell lasts.
+/// The motion is chaotic for more than 198 periods. Then a series of impacts closes, and a superstable cycle follows. The cells are those of
+/// a map in which this happens: rounding decides how long the chaos of a cell lasts.
 #[test]
 fn a_tube_is_not_called_chaotic_before_its_ball_rests() {
     for (f, a) in [
-        (14.59322033898305, 23.02127659574468),
-        (11.94915254237288, 24.638297872340427),
-        (12.966101694915254, 28.680851063829788),
-        (12.152542372881356, 31.106382978723403),
-        (15.0, 32.72340425531915),
+        (11.338983050847459, 18.170212765957448),
+        (12.152542372881356, 29.48936170212766),
+        (12.966101694915254, 31.914893617021278),
+        (13.372881355932204, 33.53191489361702),
+        (15.0, 34.340425531914896),
+        (14.389830508474576, 39.191489361702125),
     ] {
         let [early, whole] = both(f, a);
         let of = |measured: &Measurement| (measured.period, measured.multiplier.map(|[modulus, _]| modulus));
         assert!(whole.period.is_some_and(|period| period < 12), "f = {f}, a = {a}: {whole:?}");
         assert_eq!((of(&early), of(&early).1), (of(&whole), Some(0.0)), "f = {f}, a = {a}");
-        assert!(early.periods_run < 528, "f = {f}, a = {a}: {}", early.periods_run);
+        assert!((200..528).contains(&early.periods_run), "f = {f}, a = {a}: {}", early.periods_run);
     }
 }
 

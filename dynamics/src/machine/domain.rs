@@ -134,7 +134,7 @@ pub(super) struct LinearDomain {
     tables: OnceLock<Vec<Polynomial>>,
     /// Carry points over [`REACHES`] of the longest step.
     strides: [OnceLock<Carrier>; REACHES.len()],
-    /// The same equations for points in the slow subspace, if steps in it are much longer.
+    /// The equations of motion after the fast overdamped modes have decayed. None if its steps would not be much longer.
     pub(super) slow: Option<Box<LinearDomain>>,
     /// For equations in the slow subspace, the rates that are functions of the rest of the point.
     pub(super) slaved: Vec<(usize, Functional)>,

@@ -91,9 +91,9 @@ impl System {
         })
     }
 
-    /// Returns the first consistent combination of modes. Present modes of gaps and sticking elements are tried first. If rows depend on each other,
-    /// the later ones bear no force at first. If no combination is consistent then, friction forces at their limits are tried, too: if
-    /// friction is the same at rest and while sliding, all combinations that are consistent give the same accelerations.
+    /// Returns the first consistent combination of modes. Present modes of gaps and sticking elements are tried first. If rows depend on
+    /// each other, the later ones bear no force at first. If no combination is consistent then, friction forces at their limits are tried,
+    /// too: if friction is the same at rest and while sliding, all combinations that are consistent give the same accelerations.
     pub(super) fn consistent(&self, modes: &Modes, at_rest: &AtRest, point: &PhasePoint) -> Option<Modes> {
         let gaps = || (0..self.gaps()).filter_map(|gap| Some((gap, at_rest.gaps[gap]?)));
         let elements = || (0..self.elements.len()).filter(|&i| at_rest.elements[i]);

@@ -233,6 +233,7 @@ impl<'s> MachineMotion<'s> {
         if !self.system.ties.is_empty() {
             self.system.hold(&self.modes, &mut self.point, false);
             self.hold_tangents();
+            self.forget_watches();
         }
         self.period += 1;
         (self.events_in_period, self.steps_in_period) = (0, 0);

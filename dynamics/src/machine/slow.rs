@@ -4,13 +4,13 @@
 //! some coordinates are linear functions of the rest of the point. These rates, and so the equations of motion in this subspace, follow from
 //! the left eigenvectors of the fast modes, which power iteration finds. A step there is as long as the slow modes allow.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Schur};
 
 use super::domain::{Functional, LinearDomain, RADIUS};
 use super::{PhasePoint, ROUNDING};
 
 /// Smallest ratio of the rates of fast and slow modes.
-const GAP: f64 = 4.0;
+const SEPARATION: f64 = 4.0;
 
 /// Smallest ratio of the decay rate and the modulus of an overdamped mode. Rounding may give a double mode an imaginary part.
 const OVERDAMPED: f64 = 0.99;
@@ -18,6 +18,9 @@ const OVERDAMPED: f64 = 0.99;
 /// Largest factor of another rate in a slaved rate, and of a displacement in units of the fastest rate. Larger ones are those of modes that
 /// share a coordinate.
 const MOST_FACTOR: f64 = 100.0;
+
+/// Largest number of steps of the decomposition that gives the eigenvalues.
+const MOST_SCHUR_STEPS: usize = 10_000;
 
 /// Largest number of power iterations. At the smallest ratio, 27 reach rounding.
 const MOST_ITERATIONS: usize = 64;
@@ -32,26 +35,26 @@ const MOST_HALVINGS: u32 = 4;
 const LONGEST_DECAY: f64 = 4.0;
 
 impl LinearDomain {
-    /// Returns the equations of motion in the slow subspace, if steps in it are much longer.
-    /// `forced` is the fastest rate of the forcing.
+    /// Returns the equations of motion in the slow subspace. None if their steps would not be much longer. `forced` is the fastest rate of
+    /// the forcing.
     pub(super) fn slowed(&self, forced: f64) -> Option<LinearDomain> {
         let (n, bound) = (self.n, 1.0 / self.radian());
-        if bound <= GAP * forced {
+        if bound <= SEPARATION * forced {
             return None;
         }
         let state = DMatrix::from_fn(2 * n, 2 * n, |i, j| match i.checked_sub(n) {
             None => f64::from(u8::from(j == n + i)),
             Some(i) => self.accelerations[i].0[j],
         });
-        let mut modes: Vec<_> =
-            state.complex_eigenvalues().iter().map(|mode| (mode.norm(), mode.re)).collect();
+        let eigenvalues = Schur::try_new(state, f64::EPSILON, MOST_SCHUR_STEPS)?.complex_eigenvalues();
+        let mut modes: Vec<_> = eigenvalues.iter().map(|mode| (mode.norm(), mode.re)).collect();
         modes.sort_by(|a, b| b.0.total_cmp(&a.0));
         let rate_after = |count: usize| modes[count].0.max(forced);
         let decay = |(rate, real): &(f64, f64)| -*real >= OVERDAMPED * rate;
         let strong = modes.iter().take_while(|mode| decay(mode)).count().min(n);
         // Without fast modes, constraints may make the motion much slower than the bound.
         let fastest = |count: usize| if count == 0 { bound } else { modes[count - 1].0 };
-        let separate = (0..=strong).rev().filter(|&count| fastest(count) > GAP * rate_after(count));
+        let separate = (0..=strong).rev().filter(|&count| fastest(count) > SEPARATION * rate_after(count));
         separate.filter_map(|count| self.slowed_to(rate_after(count), self.slaved(count)?)).next()
     }
 
