@@ -156,7 +156,8 @@ named! {
         Neutral = "neutral",
         /// The motion grows without bound: the oscillator has negative damping or stiffness, and no contact stops it.
         Escape = "escape",
-        /// A load accelerates the motion for ever along a [rigid-body mode](crate::model::RigidMode) without dampers and friction.
+        /// A load that exceeds all friction accelerates the motion for ever along a [rigid-body mode](crate::model::RigidMode) without
+        /// dampers.
         Accelerates = "accelerates",
         /// The motion stays on an unstable cycle, from which no perturbation leads it away within the budget.
         UnstableCycle = "unstable_cycle",

@@ -17,7 +17,7 @@ use crate::cli::say;
 use crate::job::model_choice;
 use crate::map::scene::{self, Format};
 use crate::show::orbit_json::{history_to_json, to_json};
-use crate::show::orbit_summary::{history_summary, run_up_summary, summary};
+use crate::show::orbit_summary::{history_summary, run_up_summary, summary, timing};
 use crate::show::run_up::Ramp;
 use crate::store;
 use crate::store::error::OutputError;
@@ -73,7 +73,8 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     let progress = OnceCell::new();
     let report = |done: u64, total: u64| {
         if clock.elapsed() > SILENCE {
-            let begin = || Progress::of(total as usize, done as usize, "forcing periods", false, true);
+            let begin =
+                || Progress::of(total as usize, done as usize, timing(&*model).names()[1], false, true);
             progress.get_or_init(begin).report(done as usize, total as usize);
         }
     };
@@ -115,7 +116,7 @@ fn run_up(
     let mut progress = None;
     let mut report = |done: u64| {
         if clock.elapsed() > SILENCE {
-            let begin = || Progress::of(total, done as usize, "forcing periods", false, true);
+            let begin = || Progress::of(total, done as usize, timing(model).names()[1], false, true);
             progress.get_or_insert_with(begin).report(done as usize, total);
         }
     };

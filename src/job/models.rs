@@ -69,7 +69,7 @@ pub fn page(model: &FileModel) -> String {
         ]
     });
     let rows: Vec<_> = [header].into_iter().chain(parameters).collect();
-    text += &table(&rows);
+    text += &if rows.len() == 1 { "    none\n".to_owned() } else { table(&rows) };
     let source = model.source().map_or("not given".to_owned(), |title| format!("\"{title}\""));
     text + &format!("\nSource\n\n    {source}\n\nWords, classes and statuses: docs/model.md\n")
 }

@@ -119,12 +119,19 @@ impl ForceLaw {
             return refuse("force at 0", start, "0; write a constant force in `load`");
         }
         let mut pieces = Pieces { points: vec![[0.0, 0.0]], error: 0.0 };
-        for end in [low, high].into_iter().filter(|end| *end != 0.0) {
+        let ends = || [low, high].into_iter().filter(|end| *end != 0.0);
+        for end in ends() {
             let mut side = side_pieces(&force, end);
             let Some((points, error)) = side.find(|(_, error)| *error <= tolerance * largest) else {
                 let requirement =
                     "larger, or the range shorter: the force would need more than 32 linear pieces on a side";
-                return refuse("tolerance", tolerance, requirement);
+                let errors = |end| side_pieces(&force, end).map(|(_, error)| error / largest);
+                let least = ends().map(|end| errors(end).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max);
+                // The printed number is not below the least one. A force that is not finite has none.
+                let hint = Some(1.05 * least).filter(|least| *least < 1.0);
+                let hint =
+                    hint.map_or(String::new(), |least| format!(", at least {least:.1e} for this range,"));
+                return refuse(&format!("tolerance{hint}"), tolerance, requirement);
             };
             pieces.error = pieces.error.max(error / largest);
             if end < 0.0 {

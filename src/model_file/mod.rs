@@ -76,8 +76,8 @@ impl FileModel {
         &self.definition
     }
 
-    /// Returns the places of displacements and signals that a rigid-body mode shifts, whatever the values of the parameters are. Slightly
-    /// changed values tell this, because values that happen to be 0 are no property of the model.
+    /// Returns the places of displacements, gaps and signals that a rigid-body mode shifts, whatever the values of the parameters are.
+    /// Slightly changed values tell this, because values that happen to be 0 are no property of the model.
     fn drifts(&self) -> Vec<usize> {
         let change = |(i, value): (usize, &f64)| match *value {
             0.0 => 0.7 + 0.01 * i as f64,

@@ -883,11 +883,15 @@ fn force_laws_are_refused_with_a_remedy() {
         r#"
 range = "reach" | | m.toml:26:1: `spring.0.range` is missing; write the range of the elongation, such as range = 2 for -2 to 2
 range = "reach" | range = [1, 2] | `spring.0.range = [1, 2]` does not fit: at the defaults of duffing, range of nonlinear spring 1 = 1: it must be a range of finite length that contains 0
-tolerance = "tol" | tolerance = 1e-7 | `spring.0.tolerance = 1e-7` does not fit: at the defaults of duffing, tolerance of nonlinear spring 1 = 1e-7: it must be larger, or the range shorter: the force would need more than 32 linear pieces on a side
+tolerance = "tol" | tolerance = 1e-7 | `spring.0.tolerance = 1e-7` does not fit: at the defaults of duffing, tolerance, at least 2.6e-4 for this range, of nonlinear spring 1 = 1e-7: it must be larger, or the range shorter: the force would need more than 32 linear pieces on a side
+tolerance = "tol" | tolerance = 2.4e-4 | tolerance, at least 2.6e-4 for this range, of nonlinear spring 1 = 0.00024: it must be larger
+force = "k*x + a*x^3" | force = "x^0.5" | tolerance of nonlinear spring
 force = "k*x + a*x^3" | force = "1 + x" | `spring.0.force = "1 + x"` does not fit: at the defaults of duffing, force at 0 of nonlinear spring 1 = 1: it must be 0; write a constant force in `load`
 [[spring]] | [[spring]]\nrow = [0] | `spring.0.row = [0]` does not fit: at the defaults of duffing, row of nonlinear spring 1 = 0: it must be not 0
 "#,
     );
+    let least = text_of("duffing").replace("tolerance = \"tol\"", "tolerance = 2.6e-4");
+    assert!(FileModel::parse(&least, "m.toml").is_ok());
     check_refusals(
         &text_of("hertz-ball"),
         r#"

@@ -353,7 +353,7 @@ pub struct Subjects {
     pub gaps: Vec<String>,
     /// Signals.
     pub signals: Vec<String>,
-    /// Places of displacements and signals that drift, for all values of the parameters, in [`Quantities::displacements`].
+    /// Places of displacements, gaps and signals that drift, for all values of the parameters, in [`Quantities::displacements`].
     pub drifts: Vec<usize>,
 }
 

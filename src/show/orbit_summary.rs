@@ -111,7 +111,7 @@ fn state(model: &dyn Model, instant: Instant) -> String {
 }
 
 /// Returns what the period of a model is.
-fn timing(model: &dyn Model) -> Timing {
+pub fn timing(model: &dyn Model) -> Timing {
     model.oscillator().map_or(Timing::Forced, |oscillator| oscillator.timing)
 }
 
@@ -229,7 +229,9 @@ fn status(status: Status) -> &'static str {
             "simultaneous: two gaps reached their walls together; their order in the model decides"
         }
         Status::OutOfRange => "out_of_range: a nonlinear spring or wall was deformed beyond its range",
-        Status::Accelerates => "accelerates: a load accelerates the motion for ever, and nothing opposes it",
+        Status::Accelerates => {
+            "accelerates: a load accelerates the motion for ever; no damper and too little friction oppose it"
+        }
     }
 }
 

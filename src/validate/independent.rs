@@ -90,7 +90,7 @@ impl Strobed<'_> {
         self.flight.advance(self.from, self.from + TAU)?;
         let state = self.flight.state();
         for mode in &self.rigid_modes.modes {
-            self.flight.shift(&mode.direction, -state[2 * mode.coordinate]);
+            self.flight.shift(mode, -state[2 * mode.coordinate]);
         }
         Some(())
     }

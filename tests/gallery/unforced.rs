@@ -174,6 +174,39 @@ fn cycles_without_loss_are_neutral_families() {
     assert!(near(orbit.cycle_time.unwrap(), PI, 1e-12), "{:?}", orbit.cycle_time);
 }
 
+/// A nonlinear mode of two masses, one of them between elastic stops. Matrix exponentials give starts and times. Phase 0 and the energy
+/// may be changed, so that a double multiplier is 1.
+#[test]
+fn a_nonlinear_mode_is_neutral_however_long_it_is_observed() {
+    let text = STOPS
+        .replace("parameters = { c = 0.1, e = 0.5, d = 1.0 }", "parameters = { d = 1.0 }")
+        .replace("law = \"impact\", restitution = \"e\"", "law = \"elastic\", stiffness = 30")
+        .replace("[\"x\"]", "[\"x\", \"y\"]")
+        .replace(
+            "mass = [[1]]\ndamping = [[\"-c\"]]\nstiffness = [[1]]\ngap = [1]",
+            "mass = [[1, 0], [0, 1]]\nstiffness = [[2, -1], [-1, 1]]\ngap = [1, 0]",
+        );
+    let mode = model(&text);
+    for (x, y, time) in [
+        (1.02, -0.601_362_292_616_955_3, 3.834_168_8),
+        (1.05, -0.552_547_600_698_900_5, 3.711_869_96),
+        (1.2, -0.340_582_471_891_809_2, 3.015_544_96),
+    ] {
+        for (transient, observed) in [(100, 128), (400, 128), (400, 512)] {
+            let settings =
+                Settings { transient_periods: transient, observed_periods: observed, ..Settings::default() };
+            let found = analyse(&mode, state(&[x, 0.0, y, 0.0]), &settings).unwrap();
+            assert_eq!(
+                (found.class, found.status),
+                (Class::Periodic { period: 1 }, Status::Neutral),
+                "{x} {transient} {observed}"
+            );
+            assert!(near(found.cycle_time.unwrap(), time, 1e-8), "{x} {:?}", found.cycle_time);
+            assert!(found.floquet.unwrap().iter().all(|[re, im]| (re.hypot(*im) - 1.0).abs() < 1e-10));
+        }
+    }
+}
+
 #[test]
 fn rest_has_period_1_and_no_cycle_time() {
     let damped = STOPS.replace("c = 0.1", "c = -0.1");
@@ -233,6 +266,41 @@ fn a_self_excited_walker_drifts() {
     assert!(drift.abs() > 0.01 && steps.iter().all(|step| near(*step, drift, 1e-12)), "{drift} {steps:?}");
     // Four entries of the state, without the shift and the phase.
     assert_eq!(orbit.floquet.unwrap().len(), 2);
+}
+
+/// Two masses rest on a belt that moves on. The gap has no walls, so that its row does not matter.
+#[test]
+fn masses_rest_on_a_moving_belt() {
+    let on_belt = |gap: &str| {
+        format!(
+            "name = 'two-on-belt'\nfriction = [{{ row = [1, 0], force = 0.3, speed = 0.2 }}, {{ row = [0, 1], force = 0.3, speed = 0.2 }}]\n\
+             [motion]\ncoordinates = ['a', 'b']\nmass = [[1, 0], [0, 2]]\nstiffness = [[1, -1], [-1, 1]]\ntime_scale = 6\ngap = {gap}\n"
+        )
+    };
+    let one = BELT
+        .replace("damping = [[\"-c\"]]\nstiffness = [[1]]", "time_scale = 6")
+        .replace("u = 0.5", "u = 0.2");
+    for text in [on_belt("[1, 0]"), on_belt("[1, -1]"), on_belt("[0.3, 2]"), one] {
+        let orbit = orbit(&model(&text), &[0.0; 4][..if text.contains("'b'") { 4 } else { 2 }]);
+        assert_eq!((orbit.class, orbit.status), (Class::Periodic { period: 1 }, Status::Ok), "{text}");
+        assert_eq!((orbit.cycle_time, orbit.word.time_order().as_str()), (None, ""), "{text}");
+        let drift = orbit.quantities.unwrap().displacements[0].drift.unwrap();
+        assert!(near(drift, 0.2, 1e-12), "{text} {drift}");
+    }
+}
+
+/// A motion that moves away from its only wall does not return, however large its positions become.
+#[test]
+fn a_motion_that_goes_away_has_no_cycle() {
+    let text = WALKER
+        .replace(
+            "friction = [{ force = \"f\", row = [1, 0] }]",
+            "friction = [{ force = 0.3, row = [1, 0], speed = -0.2 }]",
+        )
+        .replace("gap = [1, -1]", "gap = [1, 0]\ntime_scale = 6")
+        .replace("[\"-c\", \"c\"], [\"c\", \"-c\"]", "[0, 0], [0, 0]");
+    let orbit = orbit(&model(&text), &[0.0, -0.2, 0.0, -0.2]);
+    assert_eq!((orbit.class, orbit.cycle_time), (Class::Undecided, None), "{orbit:?}");
 }
 
 #[test]

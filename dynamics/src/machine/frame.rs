@@ -172,7 +172,7 @@ impl Frame {
         };
         let shift = |mode: &RigidMode| {
             let mut direction = &to_flow * &mode.direction;
-            direction.rows_mut(0, machine.gaps.len()).fill(0.0);
+            direction.rows_mut(0, mode.gaps.len()).copy_from_slice(&mode.gaps);
             Shift {
                 measure: entries(&mut from_flow.row(mode.coordinate).iter().copied()),
                 direction: entries(&mut direction.iter().copied()),

@@ -219,9 +219,14 @@ impl DryFriction {
         self.at_speed.is_empty() && self.static_force == self.force
     }
 
+    /// Returns the largest force at any sliding rate.
+    pub fn largest_force(&self) -> f64 {
+        self.at_speed.iter().fold(self.static_force, |most, point| most.max(point[1]))
+    }
+
     /// Whether the friction ever has a force.
     pub fn acts(&self) -> bool {
-        self.static_force > 0.0 || self.at_speed.iter().any(|point| point[1] > 0.0)
+        self.largest_force() > 0.0
     }
 
     /// Returns the force as a function of the modulus of the sliding rate.

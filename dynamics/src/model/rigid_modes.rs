@@ -3,17 +3,19 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::oscillator::MATRIX_TOLERANCE;
-use super::{Forces, Oscillator, Pair, Signal, State};
-use crate::motion::{place_of_displacement, place_of_signal};
+use super::{Forces, GapRow, Oscillator, Pair, Signal, State};
+use crate::motion::{place_of_displacement, place_of_gap, place_of_signal};
 
 /// A direction `n` along which the oscillator can be shifted without changing a force: `K n = 0` in every stage, and `g . n = 0` for the row
-/// of every gap. Examples are a capsule that moves over the ground, and a driveline without a spring to its housing.
+/// of every gap with walls. Examples are a capsule that moves over the ground, and a driveline without a spring to its housing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidMode {
     /// The coordinate that measures the shift. Its entry in the direction is 1, and 0 in those of the other modes.
     pub coordinate: usize,
     /// One entry for each coordinate.
     pub direction: DVector<f64>,
+    /// Change of each gap by a shift by 1: 0 for gaps with walls.
+    pub gaps: Vec<f64>,
 }
 
 impl RigidMode {
@@ -25,7 +27,8 @@ impl RigidMode {
         };
         let displacement = (0..self.direction.len()).find(|&i| place_of_displacement(i) == place);
         let signal = || signals.iter().enumerate().find_map(of_signal);
-        displacement.map(|i| self.direction[i]).or_else(signal).unwrap_or(0.0)
+        let gap = || (0..self.gaps.len()).find(|&i| place_of_gap(i) == place).map(|i| self.gaps[i]);
+        displacement.map(|i| self.direction[i]).or_else(signal).or_else(gap).unwrap_or(0.0)
     }
 }
 
@@ -36,7 +39,8 @@ pub struct RigidModes {
     pub modes: Vec<RigidMode>,
     /// Number of independent modes along which neither dampers nor friction act. Only the force and the load change the momentum along them.
     pub conserved: usize,
-    /// Whether the load changes the momentum along one of these modes over a forcing period, so that the motion accelerates for ever.
+    /// Whether dampers do not act along a mode, and the load over a forcing period exceeds all friction there, so that the motion
+    /// accelerates for ever.
     pub accelerates: bool,
 }
 
@@ -44,9 +48,11 @@ pub struct RigidModes {
 struct Description<'a> {
     /// Stiffness and damping of each stage.
     stages: Vec<[DMatrix<f64>; 2]>,
-    /// Rows of gaps and nonlinear springs, and of friction.
-    gaps: Vec<DVector<f64>>,
-    friction: Vec<DVector<f64>>,
+    /// Rows of all gaps, and of those that a force may hold, with nonlinear springs.
+    gaps: Vec<&'a DVector<f64>>,
+    held: Vec<&'a DVector<f64>>,
+    /// Rows of friction with the largest forces.
+    friction: Vec<(&'a DVector<f64>, f64)>,
     /// Load of each stage.
     loads: Vec<DVector<f64>>,
     schedule: &'a [(f64, usize)],
@@ -63,21 +69,48 @@ impl Description<'_> {
 
 impl RigidModes {
     fn of(description: &Description<'_>, n: usize) -> RigidModes {
-        let Description { stages, gaps, friction, .. } = description;
+        let Description { stages, gaps, held, friction, .. } = description;
         let as_matrix = |row: &DVector<f64>| DMatrix::from_rows(&[row.transpose()]);
-        let held = || stages.iter().map(|[stiffness, _]| stiffness.clone()).chain(gaps.iter().map(as_matrix));
-        let modes = null_space(n, held());
-        if modes.is_empty() {
+        let held = || {
+            let rows = held.iter().map(|row| as_matrix(row));
+            stages.iter().map(|[stiffness, _]| stiffness.clone()).chain(rows)
+        };
+        let found = null_space(n, held());
+        if found.is_empty() {
             return RigidModes::default();
         }
-        let damped = stages.iter().flat_map(|[_, damping]| [damping.clone(), damping.transpose()]);
-        let conserved = null_space(n, held().chain(damped).chain(friction.iter().map(as_matrix)));
-        let load = description.load();
-        let changes = |mode: &RigidMode| {
-            let size: f64 = mode.direction.iter().zip(&load).map(|(a, b)| (a * b).abs()).sum();
-            mode.direction.dot(&load).abs() > MATRIX_TOLERANCE * size
+        let product_and_size = |a: &DVector<f64>, b: &DVector<f64>| {
+            let products = a.component_mul(b);
+            [products.sum().abs(), products.lp_norm(1)]
         };
-        RigidModes { modes, conserved: conserved.len(), accelerates: conserved.iter().any(changes) }
+        let mode = |(coordinate, direction): (usize, DVector<f64>)| {
+            let change = |row: &&DVector<f64>| {
+                let [product, size] = product_and_size(row, &direction);
+                if product > MATRIX_TOLERANCE * size { row.dot(&direction) } else { 0.0 }
+            };
+            let gaps = gaps.iter().map(change).collect();
+            RigidMode { coordinate, direction, gaps }
+        };
+        // Directions along which neither dampers nor the chosen elements with friction act.
+        let undamped = |chosen: usize| {
+            let damped = stages.iter().flat_map(|[_, damping]| [damping.clone(), damping.transpose()]);
+            let chosen = (0..friction.len()).filter(move |i| chosen >> i & 1 == 1);
+            null_space(n, held().chain(damped).chain(chosen.map(|i| as_matrix(friction[i].0))))
+        };
+        let load = description.load();
+        let exceeds = |(_, direction): &(usize, DVector<f64>)| {
+            let [load, size] = product_and_size(&load, direction);
+            let opposing = friction.iter().map(|(row, force)| row.dot(direction).abs() * force).sum::<f64>();
+            load - opposing > MATRIX_TOLERANCE * (size + opposing)
+        };
+        let choices = 1 << friction.len();
+        RigidModes {
+            modes: found.into_iter().map(mode).collect(),
+            conserved: undamped(choices - 1).len(),
+            // If the load exceeds friction along any direction, it does so along one of these, at which some sliding rates are 0: the forces
+            // that friction can balance are the combinations of its rows with limited factors, a convex polytope with these normals.
+            accelerates: (0..choices).any(|chosen| undamped(chosen).iter().any(exceeds)),
+        }
     }
 
     /// Shifts a state along the modes.
@@ -102,11 +135,16 @@ impl Oscillator {
     /// Returns the rigid-body modes.
     pub fn rigid_modes(&self) -> RigidModes {
         let of_stage = |forces: &Forces| [forces.stiffness.clone(), forces.damping.clone()];
-        let gaps = self.gaps.iter().map(|gap| gap.row.clone());
+        // Nothing happens at a gap without walls. A pair has no coordinate but its gap that it could shift.
+        let is_held =
+            |gap: &&GapRow| self.needs_machine().is_none() || gap.walls.iter().any(|walls| !walls.is_empty());
+        let held = self.gaps.iter().filter(is_held).map(|gap| &gap.row);
+        let acting = self.friction.iter().filter(|friction| friction.acts());
         let description = Description {
             stages: self.stages.iter().map(of_stage).collect(),
-            gaps: gaps.chain(self.springs.iter().map(|spring| spring.row.clone())).collect(),
-            friction: self.friction.iter().map(|friction| friction.row.clone()).collect(),
+            gaps: self.gaps.iter().map(|gap| &gap.row).collect(),
+            held: held.chain(self.springs.iter().map(|spring| &spring.row)).collect(),
+            friction: acting.map(|friction| (&friction.row, friction.largest_force())).collect(),
             loads: self.stages.iter().map(|forces| forces.load.clone()).collect(),
             schedule: &self.schedule,
         };
@@ -122,10 +160,12 @@ impl Pair {
         }
         let matrix = |of: [[f64; 2]; 2]| DMatrix::from_fn(2, 2, |i, j| of[i][j]);
         let vector = |of: [f64; 2]| DVector::from_column_slice(&of);
+        let gap = vector(self.gap);
         let free = || (0..self.stage_count()).map(|stage| self.stage(stage).free);
         let description = Description {
             stages: free().map(|free| [matrix(free.stiffness), matrix(free.damping)]).collect(),
-            gaps: vec![vector(self.gap)],
+            gaps: vec![&gap],
+            held: vec![&gap],
             friction: Vec::new(),
             loads: free().map(|free| vector(free.load)).collect(),
             schedule: &self.schedule,
@@ -139,9 +179,9 @@ impl Pair {
     }
 }
 
-/// Returns a basis of the vectors that all matrices map to 0, by Gauss-Jordan elimination with full pivoting. The entries of each matrix are
-/// compared with its largest one.
-fn null_space(n: usize, matrices: impl Iterator<Item = DMatrix<f64>>) -> Vec<RigidMode> {
+/// Returns a basis of the vectors that all matrices map to 0, each with the place of an entry that is 1, and 0 in the others, by Gauss-Jordan
+/// elimination with full pivoting. The entries of each matrix are compared with its largest one.
+fn null_space(n: usize, matrices: impl Iterator<Item = DMatrix<f64>>) -> Vec<(usize, DVector<f64>)> {
     let mut rows: Vec<DVector<f64>> = Vec::new();
     for matrix in matrices.filter(|matrix| matrix.amax() > 0.0) {
         rows.extend((&matrix / matrix.amax()).row_iter().map(|row| row.transpose()));
@@ -172,7 +212,7 @@ fn null_space(n: usize, matrices: impl Iterator<Item = DMatrix<f64>>) -> Vec<Rig
         for (row, &pivot) in rows.iter().zip(&pivots) {
             direction[pivot] = if row[coordinate].abs() > MATRIX_TOLERANCE { -row[coordinate] } else { 0.0 };
         }
-        RigidMode { coordinate, direction }
+        (coordinate, direction)
     };
     free.map(mode).collect()
 }
@@ -184,12 +224,12 @@ mod tests {
     #[test]
     fn modes_are_those_that_no_matrix_sees() {
         let chain = DMatrix::from_row_slice(3, 3, &[2.0, -2.0, 0.0, -2.0, 3.0, -1.0, 0.0, -1.0, 1.0]);
-        let [mode] = &null_space(3, [chain.clone()].into_iter())[..] else { panic!() };
-        assert!((&mode.direction - DVector::from_element(3, 1.0)).amax() < 1e-15, "{mode:?}");
+        let [(_, mode)] = &null_space(3, [chain.clone()].into_iter())[..] else { panic!() };
+        assert!((mode - DVector::from_element(3, 1.0)).amax() < 1e-15, "{mode:?}");
         let ratio = DMatrix::from_row_slice(1, 3, &[1.0, -2.0, 0.0]);
         let modes = null_space(3, [ratio.clone()].into_iter());
         assert_eq!(modes.len(), 2);
-        assert!(modes.iter().all(|mode| (&ratio * &mode.direction).amax() == 0.0));
+        assert!(modes.iter().all(|(_, mode)| (&ratio * mode).amax() == 0.0));
         assert_eq!(null_space(3, [chain, ratio].into_iter()).len(), 0);
         assert_eq!(null_space(2, [DMatrix::zeros(2, 2)].into_iter()).len(), 2);
     }

@@ -7,7 +7,7 @@
 //! whether a spiral shrinks. Velocities jump where an impact passes phase 0, and their averages converge slowly.
 
 use super::recurrence::Metric;
-use crate::model::{MOST_COORDINATES, State, difference};
+use crate::model::{REST, State, difference};
 
 /// Least number of strobe states in a window.
 pub const LEAST_WINDOW: usize = 64;
@@ -15,6 +15,10 @@ pub const LEAST_WINDOW: usize = 64;
 /// Largest difference of the averages of two windows, as a share of the distance within which the motion recurs. Of 2,400
 /// sequences of the logistic map, with windows of 64 to 200 strobes, none was below 0.0024 and half exceeded 0.06.
 pub const LARGEST_DIFFERENCE: f64 = 1.0 / 1024.0;
+
+/// Largest difference of the averages of a rate over two windows, relative to the size of the section. Of a motion that accelerates it is
+/// about half.
+const LARGEST_CHANGE_OF_RATES: f64 = 0.25;
 
 /// Least distance within which the motion recurs, relative to the size of its section. Motion that recurs within less may approach a long
 /// cycle.
@@ -35,7 +39,8 @@ pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) ->
     }
     let centre = strobes[0];
     let [first, second] = [0, length].map(|from| averages(&strobes[from..][..length], &centre, metric));
-    let largest = first.0.iter().zip(second.0).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let changes: Vec<f64> = first.0.iter().zip(second.0).map(|(a, b)| (a - b).abs()).collect();
+    let largest = |from: usize| changes[from..].iter().step_by(2).copied().fold(0.0, f64::max);
     let squares = (first.1 - second.1).abs();
     let distance = |lag: usize| {
         let squares = strobes.iter().zip(&strobes[lag..]).map(|(a, b)| metric.distance(a, b).powi(2));
@@ -45,20 +50,19 @@ pub(super) fn is_regular(strobes: &[State], metric: &Metric, max_period: u32) ->
     let size = strobes.iter().map(|y| metric.distance(y, &centre)).fold(0.0, f64::max);
     let allowed = LARGEST_DIFFERENCE * nearest;
     let is_wide = nearest > LEAST_RECURRENCE * size && allowed > ROUNDING_OF_AVERAGES * f64::EPSILON;
-    is_wide && largest < allowed && squares < allowed * size
+    is_wide && largest(0) < allowed && squares < allowed * size && largest(1) < LARGEST_CHANGE_OF_RATES * size
 }
 
-/// Returns the weighted averages of all displacements from `centre`, in units of the metric, and of the sum of their
+/// Returns the weighted averages of all displacements and rates, from those of `centre`, in units of the metric, and of the sum of their
 /// squares.
-fn averages(strobes: &[State], centre: &State, metric: &Metric) -> ([f64; MOST_COORDINATES], f64) {
-    let (mut sums, mut squares, mut total) = ([0.0; MOST_COORDINATES], 0.0, 0.0);
+fn averages(strobes: &[State], centre: &State, metric: &Metric) -> (State, f64) {
+    let (mut sums, mut squares, mut total) = (REST, 0.0, 0.0);
     for (n, y) in strobes.iter().enumerate() {
         let t = (n as f64 + 0.5) / strobes.len() as f64;
         let weight = (t * (1.0 - t)).powi(POWER);
         let y = metric.scaled(&difference(y, centre));
-        let displacements = || y.iter().step_by(2);
-        sums.iter_mut().zip(displacements()).for_each(|(sum, x)| *sum += weight * x);
-        squares += weight * displacements().map(|x| x * x).sum::<f64>();
+        sums.iter_mut().zip(&y).for_each(|(sum, x)| *sum += weight * x);
+        squares += weight * y.iter().step_by(2).map(|x| x * x).sum::<f64>();
         total += weight;
     }
     (sums.map(|sum| sum / total), squares / total)
@@ -100,6 +104,9 @@ mod tests {
             assert!(!regular(|n| state(&[1.0 + (n % period) as f64]), 400), "period {period}");
         }
         assert!(!regular(|n| state(&[n as f64, 1.0]), 400));
+        let turns = |n: usize| 3.88 * n as f64;
+        assert!(regular(|n| state(&[turns(n).sin(), turns(n).cos()]), 400));
+        assert!(!regular(|n| state(&[turns(n).sin(), turns(n).cos(), 0.0, n as f64]), 400), "acceleration");
         // Chaotic sequences that alternate between two narrow bands.
         for (seed, width) in (0..500).flat_map(|seed| [1.0, 0.05].map(|width| (seed, width))) {
             let mut x = 0.1 + 0.001 * f64::from(seed);

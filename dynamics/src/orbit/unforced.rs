@@ -145,11 +145,14 @@ impl Analysis<'_> {
                 return None;
             }
         }
-        if least > CLOSED {
+        let flow = self.flow.on_cycle(time)?;
+        let seed = ahead.in_flow(&flow)?.at(y, []);
+        // Every state returns within rounding after a time in which the motion moves less than this.
+        let is_short = metric.size(&seed.velocity().map(|rate| rate * time)) < ON_CYCLE;
+        if least > CLOSED || is_short {
             return None;
         }
-        let flow = self.flow.on_cycle(time)?;
-        self.of_cycle(&flow, &ahead.in_flow(&flow)?.at(y, []), newton, metric, &start)
+        self.of_cycle(&flow, &seed, newton, metric, &start)
     }
 
     /// Returns the orbit of the cycle through the state of `seed`, and the distance of a state from it.

@@ -258,19 +258,36 @@ where
     svd.solve(&-residual, cutoff).ok()
 }
 
+/// Returns a matrix on the directions beside an eigenvector. A second eigenvalue equal to the eigenvector's keeps its digits: as one of a
+/// double eigenvalue it would have the square root of the matrix's rounding errors.
+fn without(matrix: &DMatrix<f64>, eigenvector: &DVector<f64>) -> DMatrix<f64> {
+    let n = matrix.nrows();
+    let mut axis = eigenvector.normalize();
+    axis[0] += axis[0].signum();
+    axis.normalize_mut();
+    let reflection = DMatrix::identity(n, n) - 2.0 * &axis * axis.transpose();
+    (&reflection * matrix * &reflection).view((1, 1), (n - 1, n - 1)).into_owned()
+}
+
 fn cycle(seed: &Trajectory<'_>, map: StrobeMap, state: State, image: &Image) -> Option<Cycle> {
     let (scaled, log_scale) = map.monodromy(image);
     let size = scaled.nrows();
     let entry = |i, j| super::in_displacements(scaled[(i, j)], image.rate, i, j);
     let matrix = DMatrix::from_fn(size, size, entry);
-    let mut scaled_multipliers = multipliers(&matrix)?;
+    let flow = seed.flow();
+    // The choice of phase 0 on a cycle without force has the multiplier 1, and the velocity as its direction.
+    let velocity = (flow.timing == Timing::Cycle).then(|| seed.at(state, []).velocity());
+    let velocity = velocity.map(|rates| in_displacements(&flow.rigid_modes.shifted_back(rates), image.rate));
+    let velocity = velocity.filter(|rates| rates.iter().any(|rate| *rate != 0.0));
+    let mut scaled_multipliers = match &velocity {
+        Some(velocity) => multipliers(&without(&matrix, &DVector::from_column_slice(&velocity[..size])))?,
+        None => multipliers(&matrix)?,
+    };
     // A shift along a rigid-body mode is undone: it has the multiplier 0. If momentum along the mode is conserved, its rate has the
-    // multiplier 1. An element that never slides makes a family of cycles along its row, with the multiplier 1, too, and so does the choice
-    // of phase 0 on a cycle without force.
-    let (rigid, conserved) = (seed.flow().rigid_modes.modes.len(), seed.flow().rigid_modes.conserved);
-    scaled_multipliers.truncate(2 * seed.flow().degrees - rigid);
-    let free_phase = usize::from(seed.flow().timing == Timing::Cycle);
-    for _ in 0..conserved + image.never_slid + free_phase {
+    // multiplier 1. An element that never slides makes a family of cycles along its row, with the multiplier 1, too.
+    let (rigid, conserved) = (flow.rigid_modes.modes.len(), flow.rigid_modes.conserved);
+    scaled_multipliers.truncate(2 * flow.degrees - rigid - usize::from(velocity.is_some()));
+    for _ in 0..conserved + image.never_slid {
         let off = |[re, im]: &[f64; 2]| (re * log_scale.exp() - 1.0).hypot(im * log_scale.exp());
         let nearest = scaled_multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
         let Some((along, _)) = nearest.filter(|(_, of)| rigid == 0 || off(of) < UNIT_ERROR) else { break };

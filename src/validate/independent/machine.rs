@@ -15,7 +15,7 @@ use nalgebra::DVector;
 
 use super::Tally;
 use super::dop853::Integration;
-use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, REST, Side, State};
+use rattlemap_dynamics::model::{MOST_FRICTION, MOST_GAPS, Oscillator, REST, RigidMode, Side, State};
 use rattlemap_dynamics::motion::EventKind;
 
 use system::{
@@ -248,12 +248,13 @@ impl Flight {
         }
     }
 
-    /// Shifts all displacements along a direction that changes no gap.
-    pub(super) fn shift(&mut self, direction: &DVector<f64>, by: f64) {
+    /// Shifts all displacements along a rigid-body mode. Gaps that it does not change keep their digits.
+    pub(super) fn shift(&mut self, mode: &RigidMode, by: f64) {
         let mut state = REST;
-        direction.iter().enumerate().for_each(|(i, direction)| state[2 * i] = by * direction);
+        mode.direction.iter().enumerate().for_each(|(i, direction)| state[2 * i] = by * direction);
         let shift = self.system.to_coordinates(&state);
-        (self.system.gaps()..self.system.n).for_each(|i| self.y[i] += shift[i]);
+        let is_changed = |i: &usize| mode.gaps.get(*i).is_none_or(|change| *change != 0.0);
+        (0..self.system.n).filter(is_changed).for_each(|i| self.y[i] += shift[i]);
     }
 
     /// Returns the phases in turns at which the stage changes.

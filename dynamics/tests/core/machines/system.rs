@@ -251,7 +251,8 @@ impl System {
         let as_row = |row: &Vector| Matrix::from_rows(&[row.transpose()]);
         let stages = || system.machine.stages.iter();
         let mut held: Vec<Matrix> = stages().map(|forces| forces.stiffness.clone()).collect();
-        held.extend(system.machine.gaps.iter().map(|gap| as_row(&gap.row)));
+        let with_walls = system.machine.gaps.iter().filter(|gap| gap.walls != [vec![], vec![]]);
+        held.extend(with_walls.map(|gap| as_row(&gap.row)));
         held.extend(system.machine.springs.iter().map(|spring| as_row(&spring.row)));
         let mut damped = held.clone();
         damped.extend(stages().flat_map(|forces| [forces.damping.clone(), forces.damping.transpose()]));
