@@ -8,6 +8,7 @@
 //! - [`motion`]: the trajectory from event to event, by either engine;
 //! - [`stability`]: cycles, Floquet multipliers and Lyapunov exponents;
 //! - [`orbit`]: the class of a motion;
+//! - [`cycle`]: cycles as boundary value problems;
 //! - [`word`]: the symbols of a cycle;
 //! - [`number`]: numbers in messages.
 
@@ -27,3 +28,5 @@ pub mod stability;
 pub mod word;
 
 pub mod orbit;
+
+pub mod cycle;

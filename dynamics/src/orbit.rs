@@ -36,7 +36,7 @@ pub use history::{History, Stopped, history};
 pub use instant::{LONGEST_TIME, is_reached, state_at};
 pub use itinerary::NEAR_STROBE_TURNS;
 pub use quantities::{
-    Approaches, Displacement, FrictionQuantities, GapQuantities, Quantities, quantities_after,
+    Approaches, Displacement, FrictionQuantities, GapQuantities, Quantities, quantities_after, quantities_on,
 };
 pub use reading::ON_STROBE_TURNS;
 pub use regularity::{LARGEST_DIFFERENCE, LEAST_RECURRENCE, LEAST_WINDOW, ROUNDING_OF_AVERAGES};

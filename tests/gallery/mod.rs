@@ -6,6 +6,7 @@
 mod cycle;
 
 mod ball;
+mod branches;
 mod chaos_ends;
 mod clearance;
 mod clutch;

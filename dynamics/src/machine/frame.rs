@@ -76,7 +76,7 @@ pub struct Frame {
     /// Longest step in any stage and domain.
     pub(crate) longest_step: f64,
     /// `d = to_flow x`, and `x = from_flow d`, which does not read dependent gaps. Nor do mass, stiffness and damping of free motion.
-    to_flow: DMatrix<f64>,
+    pub(super) to_flow: DMatrix<f64>,
     pub(super) from_flow: DMatrix<f64>,
     pub(super) mass: DMatrix<f64>,
     /// Changes of `w` by unit impulses, and the factor that scales the forces on independent coordinates to mass 1.
@@ -260,7 +260,7 @@ impl Frame {
     }
 
     /// Returns the number of coordinates of the model.
-    pub(super) fn degrees(&self) -> usize {
+    pub(crate) fn degrees(&self) -> usize {
         self.from_flow.nrows()
     }
 

@@ -4,6 +4,7 @@ use super::constraints::NO_MOBILITY;
 use super::domain::LinearDomain;
 use super::domains::System;
 use super::modes::{AtRest, GapMode, Modes};
+use super::passages::{Bounce, Impulse};
 use super::{Numbers, PhasePoint, ROUNDING, SIZE};
 use crate::model::{Contact, MOST_COORDINATES, MOST_GAPS, Side, Wall};
 use crate::motion::Slip;
@@ -34,6 +35,7 @@ pub(super) struct Outcome {
     pub(super) pressing: f64,
     /// Derivatives of the jumps of all rates with respect to the gap's rate before the impact.
     pub(super) jump: Numbers,
+    pub(super) impulse: Impulse,
 }
 
 /// Changes of all rates by an impulse that changes the gap's rate by 1, and for each gap whether it leaves the rigid wall on which it
@@ -90,12 +92,15 @@ impl Impact<'_> {
         let domain = system.domain(&free);
         let pressing = side.sign() * domain.departure(gap, &bounced).1;
         let is_slow = leaving <= self.wall.mesh_speed.max(self.lowest_speed(domain, gap, &bounced));
-        let outcome = |modes, point: &PhasePoint, lasts, factor: f64| Outcome {
+        let is_held = |other: usize| self.modes.gaps[other].rest().is_some() && !let_go[other];
+        let held = std::array::from_fn(|other| other != gap && is_held(other));
+        let outcome = |modes, point: &PhasePoint, lasts, factor: f64, bounce| Outcome {
             modes,
             rates: std::array::from_fn(|i| if i < n { point[n + i] } else { 0.0 }),
             lasts,
             pressing,
             jump: kick.map(|kick| kick * factor),
+            impulse: Impulse { gap, side, held, bounce },
         };
         let factor = 1.0 + e + slope * self.approach;
         if is_slow && self.wall.contact == Contact::Rigid {
@@ -103,24 +108,30 @@ impl Impact<'_> {
             modes.gaps[gap] = GapMode::Stuck(side);
             let (held, fits) = self.slide_after_jump(&modes, kick, &stopped, Some(side));
             if fits && held.gaps[gap] == GapMode::Stuck(side) {
-                return outcome(held, &stopped, true, 1.0);
+                return outcome(held, &stopped, true, 1.0, Bounce::Stops);
             }
         } else if is_slow && pressing > 0.0 {
             let mut meshing = free;
             meshing.gaps[gap] = if leaving > 0.0 { GapMode::Onset(side) } else { GapMode::Pressed(side) };
             if side.sign() * system.domain(&meshing).departure(gap, &bounced).1 > 0.0 {
                 if leaving <= self.wall.mesh_speed || e >= 1.0 {
-                    return outcome(meshing, &bounced, true, factor);
+                    return outcome(meshing, &bounced, true, factor, Bounce::Leaves);
                 }
                 // The rest of the series lasts `2 u / (G (1 - e))` for the leaving speed u and the pressing acceleration G. A flight with
                 // the speed `2 u / (1 - e)` ends at the same time, with the same momentum.
                 let longer = 2.0 / (1.0 - e);
                 let whole =
                     after(-side.sign() * (1.0 + longer * e) * self.approach, -side.sign() * longer * leaving);
-                return outcome(meshing, &whole, true, 1.0 + longer * (e + slope * self.approach));
+                return outcome(
+                    meshing,
+                    &whole,
+                    true,
+                    1.0 + longer * (e + slope * self.approach),
+                    Bounce::Ends,
+                );
             }
         }
-        outcome(free, &bounced, false, factor)
+        outcome(free, &bounced, false, factor, Bounce::Leaves)
     }
 
     /// Returns the kick while other gaps rest on rigid walls. A gap stays at rest if its wall pushes, or if it is in `kept`.
@@ -161,7 +172,7 @@ impl Impact<'_> {
     /// Returns the changes of all rates by an impulse that changes the gap's rate by 1 while walls hold other gaps. Also returns the impulses
     /// of these walls, divided by the impulse on the gap. The impulse of a wall is 0 if earlier ones hold its gap. None if the walls hold the
     /// gap itself.
-    fn kick(&self, is_held: impl Fn(usize) -> bool) -> Option<(Numbers, [f64; MOST_GAPS])> {
+    pub(super) fn kick(&self, is_held: impl Fn(usize) -> bool) -> Option<(Numbers, [f64; MOST_GAPS])> {
         let (gap, gaps, m) = (self.gap, self.system.gaps(), |i, j| self.system.mobility[(i, j)]);
         // Gaussian elimination. The last entry of a row is the right-hand side.
         let mut rows: Vec<(usize, [f64; MOST_GAPS + 1])> = Vec::new();

@@ -3,18 +3,21 @@
 //! Observers are trait objects, so that the program has one copy of this code.
 
 mod act;
+mod record;
 mod series;
 mod settle;
 mod start;
 mod tangents;
 
 pub use act::TIE;
+pub(super) use series::SeriesModes;
 pub(crate) use start::CarriedModes;
 
 use super::domain::{Carrier, LinearDomain, Path, STAYS_ZERO};
 use super::domains::System;
 use super::flight::Flight;
 use super::modes::{MOST_CURVES, Modes};
+use super::passages::{End, Impulse, Passage};
 use super::polynomial::{LEAST_REGISTERS, REACHES, registers_for};
 use super::slow::decaying_step;
 use super::watch::{First, Moment, Roots, Watch, Watches};
@@ -53,8 +56,10 @@ pub struct MachineMotion<'s> {
     log_scale: f64,
     /// State before the event.
     before: Numbers,
-    /// For each impact of the event, the gap and minus the derivatives of the jumps of all rates with respect to the gap's rate.
-    jumps: Vec<(usize, Numbers)>,
+    /// For each impact of the event, minus the derivatives of the jumps of all rates with respect to the gap's rate.
+    jumps: Vec<(Impulse, Numbers)>,
+    /// What the motion has passed, if it is recorded.
+    passages: Option<Vec<Passage>>,
     events_in_period: u64,
     steps_in_period: u64,
     contact_time: f64,
@@ -225,10 +230,12 @@ impl<'s> MachineMotion<'s> {
         self.change = 0;
         if self.system.schedule.first().is_some_and(|change| change.0 == 0.0) {
             self.set_clock(self.system.period);
+            self.pass(End::Stage(0));
             self.enter_stage(self.system.schedule[0].1, observer);
             self.set_clock(0.0);
             self.change = 1;
         }
+        self.pass(End::Period);
         self.shift_back(observer);
         if !self.system.ties.is_empty() {
             self.system.hold(&self.modes, &mut self.point, false);
@@ -275,6 +282,7 @@ impl<'s> MachineMotion<'s> {
                 self.step(observer)?;
             }
             let Some(&(_, stage)) = change else { return self.check_finite() };
+            self.pass(End::Stage(self.change));
             self.change += 1;
             self.enter_stage(stage, observer);
         }
@@ -386,7 +394,9 @@ impl<'s> MachineMotion<'s> {
             None => (self.stride + 1).min(REACHES.len() - 1),
         };
         if let Some(watch) = event {
+            self.pass(End::Event(watch, Vec::new()));
             self.cross(watch, observer);
+            self.end_passage();
             return self.check_events();
         }
         if h == remaining {
@@ -431,6 +441,7 @@ impl<'s> MachineMotion<'s> {
 
     /// Processes the root of a watch at the present state, and lets the tangents jump.
     fn cross(&mut self, watch: Watch, observer: &mut dyn Observer) {
+        self.jumps.clear();
         if let Watch::Border(i, is_upper) = watch {
             self.pass_border(i, is_upper);
             return;
@@ -445,7 +456,6 @@ impl<'s> MachineMotion<'s> {
             self.system.hold(&self.modes, &mut self.point, false);
         }
         self.note_before();
-        self.jumps.clear();
         let linearised = row.map(|row| (row, self.domain.derivative(&self.point)));
         let energy = |motion: &Self| motion.system.energy(&motion.modes, &motion.point);
         let before = observer.sums().is_some().then(|| energy(self));
@@ -465,7 +475,7 @@ impl<'s> MachineMotion<'s> {
             self.saltate(watch, &row, &field);
         }
         if let (Watch::Wall(gap, side), [(hit, _)]) = (watch, &self.jumps[..])
-            && gap == *hit
+            && gap == hit.gap
             && self.modes.gaps[gap] == self.system.before_last(gap, side)
         {
             self.close_series(gap, side, observer);

@@ -146,6 +146,13 @@ pub fn quantities_after(
     Meter::measure(&mut motion, if period > 0 { period } else { observed.max(1) }).ok()
 }
 
+/// Measures one cycle of `period` forcing periods from its state at phase 0. The cycle may be unstable.
+///
+/// Returns `None` if the motion cannot be continued.
+pub fn quantities_on(flow: &Flow, law: Law, strobe: State, period: u32) -> Option<Quantities> {
+    Meter::measure(&mut Trajectory::new(flow, law, strobe), period).ok()
+}
+
 /// Measures a trajectory from its events.
 #[derive(Clone, Debug)]
 pub(super) struct Meter<'f> {

@@ -205,13 +205,13 @@ impl MachineMotion<'_> {
         }
         let (modes, point) = (&self.modes, &self.point);
         let impact = Impact { system, modes, point, gap, side, wall, approach };
-        let Outcome { modes: next, rates, lasts, pressing, jump } = impact.outcome();
+        let Outcome { modes: next, rates, lasts, pressing, jump, impulse } = impact.outcome();
         if !lasts && pressing <= 0.0 && approach < GRAZING_SPEED * system.speed {
             self.near_grazing = true;
         }
         // A gap that begins to press its wall from rest does so in neighbouring motions, too.
         if approach > 0.0 {
-            self.jumps.push((gap, jump));
+            self.jumps.push((impulse, jump));
         }
         self.point[system.n..2 * system.n].copy_from_slice(&rates[..system.n]);
         let (kind, meshing) = if lasts {

@@ -6,7 +6,8 @@ use crate::machine::domain::LinearDomain;
 use crate::machine::flight::Flight;
 use crate::machine::impact::Impact;
 use crate::machine::modes::{AtRest, GapMode, Modes};
-use crate::machine::{Numbers, PhasePoint, ROUNDING};
+use crate::machine::passages::{Bounce, End, Impulse};
+use crate::machine::{Numbers, PhasePoint, ROUNDING, System};
 use crate::model::{Contact, MOST_FRICTION, MOST_GAPS, Restitution, Side};
 use crate::motion::{CLOSING_ANGLE, EventKind, NO_THRESHOLD, Observer, Slip, SlipKind, Slips};
 
@@ -18,6 +19,61 @@ const LEAST_SPEED: f64 = 1e-17;
 
 /// Relative changes of speeds and accelerations for derivatives of a duration. It is almost a power of them.
 const DIFFERENCE: f64 = 1e-4;
+
+/// The modes of a series of impacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::machine) struct SeriesModes {
+    gap: usize,
+    side: Side,
+    /// Modes of the gap that leaves its wall, and of the gap at rest on it.
+    free: Modes,
+    pub(in crate::machine) held: Modes,
+    /// Friction while the gap comes back.
+    back: Slips,
+}
+
+impl SeriesModes {
+    /// Returns the rest of the series for the point of the stopped gap and the changes of all rates by an impulse on it.
+    fn rest<'a>(&self, system: &'a System, kick: &Numbers, stopped: &PhasePoint) -> Rest<'a> {
+        let (n, s, free) = (system.n, self.side.sign(), system.domain(&self.free));
+        let back = match self.back == self.free.slips {
+            true => free,
+            false => system.domain(&Modes { slips: self.back, ..self.free }),
+        };
+        let row = &free.accelerations[self.gap];
+        Rest {
+            pressing: [free, back].map(|domain| s * domain.accelerations[self.gap].dot(stopped)),
+            change: s * system.domain(&self.held).rate_of(row).dot(stopped),
+            damping: -(0..n).map(|i| row.0[n + i] * kick[i]).sum::<f64>(),
+            restitution: &system.last_wall(self.gap, self.side).restitution,
+        }
+    }
+
+    /// Returns the impact that stops the gap. Other gaps at rest stay there.
+    pub(in crate::machine) fn impulse(&self) -> Impulse {
+        let held = std::array::from_fn(|other| self.free.gaps[other].rest().is_some());
+        Impulse { gap: self.gap, side: self.side, held, bounce: Bounce::Stops }
+    }
+
+    /// Returns the duration of the rest, for a point where the gap has just left its wall.
+    pub(in crate::machine) fn duration(&self, system: &System, point: &PhasePoint) -> f64 {
+        let (wall, mut stopped) = (system.last_wall(self.gap, self.side), *point);
+        let (gap, side, modes) = (self.gap, self.side, &self.free);
+        let impact = Impact { system, modes, point, gap, side, wall, approach: 0.0 };
+        let kick = impact.kick(|other| modes.gaps[other].rest().is_some());
+        let kick = kick.map_or(system.kicks[gap], |(kick, _)| kick);
+        let rate = stop(&mut stopped, &kick, system.n, gap);
+        self.rest(system, &kick, &stopped).duration(-side.sign() * rate, 0.0)
+    }
+}
+
+/// Stops a gap by an impulse, and returns its rate before.
+fn stop(y: &mut [f64], kick: &Numbers, n: usize, gap: usize) -> f64 {
+    let rate = y[n + gap];
+    (0..n).for_each(|i| y[n + i] -= kick[i] * rate);
+    y[n + gap] = 0.0;
+    rate
+}
 
 /// The rest of a series of impacts.
 struct Rest<'a> {
@@ -64,27 +120,16 @@ impl Rest<'_> {
 
 /// A series of impacts whose rest is short.
 struct Series<'s> {
+    modes: SeriesModes,
     /// Changes of all rates by an impulse that changes the gap's rate by 1.
     kick: Numbers,
     /// Leaving speed, and duration of the rest.
     speed: f64,
     time: f64,
     rest: Rest<'s>,
-    /// The present domain, the one of a gap at rest on its wall, and the modes of the latter.
+    /// The domains of the gap that leaves its wall, and of the gap at rest.
     free: &'s LinearDomain,
     at_rest: &'s LinearDomain,
-    held: Modes,
-    /// Friction while the gap comes back.
-    back: Slips,
-}
-
-impl Series<'_> {
-    /// Stops the gap.
-    fn stop(&self, y: &mut [f64], n: usize, gap: usize) {
-        let rate = y[n + gap];
-        (0..n).for_each(|i| y[n + i] -= self.kick[i] * rate);
-        y[n + gap] = 0.0;
-    }
 }
 
 impl<'s> MachineMotion<'s> {
@@ -114,13 +159,11 @@ impl<'s> MachineMotion<'s> {
         if system.elements.is_empty() && !closes([s * row.dot(&point) - speed * damping; 2]) {
             return None;
         }
-        let rest = Rest { pressing: [0.0; 2], change: 0.0, damping: 0.0, restitution: &wall.restitution };
         let mut held = modes;
         held.gaps[gap] = GapMode::Stuck(side);
-        let mut series =
-            Series { kick, speed, time: 0.0, rest, free, at_rest: free, held, back: modes.slips };
+        let mut series = SeriesModes { gap, side, free: modes, held, back: modes.slips };
         let mut stopped = point;
-        series.stop(&mut stopped, n, gap);
+        stop(&mut stopped, &kick, n, gap);
         for (i, element) in system.elements.iter().enumerate() {
             let along: f64 = element.row.iter().zip(&kick).map(|(row, kick)| row * kick).sum();
             let [rate, size] = element.rate_and_size(&stopped[n..]);
@@ -133,21 +176,13 @@ impl<'s> MachineMotion<'s> {
                 return None;
             }
         }
-        let back = if series.back == modes.slips {
-            free
-        } else {
-            system.domain(&Modes { slips: series.back, ..modes })
-        };
-        let pressing = [free, back].map(|domain| s * domain.accelerations[gap].dot(&stopped));
-        if !closes(pressing) {
+        let rest = series.rest(system, &kick, &stopped);
+        if !closes(rest.pressing) {
             return None;
         }
-        series.at_rest = system.domain(&series.held);
-        series.rest.pressing = pressing;
-        series.rest.change = s * series.at_rest.rate_of(row).dot(&stopped);
-        series.rest.damping = damping;
-        series.time = series.rest.duration(speed, 0.0);
-        (series.time < self.clock.remaining(self.goal).min(series.at_rest.unit)).then_some(series)
+        let (at_rest, time) = (system.domain(&series.held), rest.duration(speed, 0.0));
+        let is_short = time < self.clock.remaining(self.goal).min(at_rest.unit);
+        is_short.then_some(Series { modes: series, kick, speed, time, rest, free, at_rest })
     }
 
     /// Whether an element that slides along the gap of a series sticks where its rate vanishes, because it is larger at rest than sliding.
@@ -165,15 +200,16 @@ impl<'s> MachineMotion<'s> {
         let (system, n, modes, start) = (self.system, self.system.n, self.modes, self.point);
         let mut memory = self.memory.take().unwrap_or_default();
         let Memory { path, watches } = &mut *memory;
-        self.modes = series.held;
+        self.modes = series.modes.held;
         self.refresh();
-        series.stop(&mut self.point, n, gap);
+        stop(&mut self.point, &series.kick, n, gap);
         series.at_rest.begin(&self.point, series.time, path);
         let moment = self.moment();
         watches.forget();
         moment.list(watches);
         let first = moment.first_event(watches, path);
         if first.number.is_none() && !first.touches {
+            self.end_passage();
             series.at_rest.expand(path, n, 1.0);
             if let Some(sums) = observer.sums() {
                 let [before, after] = [start, self.point].map(|point| system.energy(&modes, &point));
@@ -186,6 +222,7 @@ impl<'s> MachineMotion<'s> {
             let times = (self.contact_time, self.sticking_time);
             self.advance(series.at_rest, path, 1.0, series.time);
             (self.contact_time, self.sticking_time) = times;
+            self.pass(End::Series(series.modes));
             self.modes = modes;
             let ends = series.at_rest.derivative(&self.point);
             self.end_series(gap, side, &series, observer);
@@ -217,7 +254,7 @@ impl<'s> MachineMotion<'s> {
             let later = s * tangent[gap] / speed;
             (0..2 * n).for_each(|i| tangent[i] += leaves[i] * later);
             let faster = -s * tangent[n + gap];
-            series.stop(tangent, n, gap);
+            stop(tangent, &series.kick, n, gap);
             tangent[gap] = 0.0;
             (0..2 * n).for_each(|i| tangent[i] -= rests[i] * later);
             let row = &series.free.accelerations[gap].0[..2 * n];
@@ -229,20 +266,19 @@ impl<'s> MachineMotion<'s> {
 
     /// Begins contact at the limit of a series.
     fn end_series(&mut self, gap: usize, side: Side, series: &Series<'_>, observer: &mut dyn Observer) {
-        let (system, mut next) = (self.system, series.held);
-        let rubs: Vec<usize> =
-            (0..MOST_FRICTION).filter(|&i| series.back[i] != self.modes.slips[i]).collect();
+        let (system, mut next, back) = (self.system, series.modes.held, series.modes.back);
+        let rubs: Vec<usize> = (0..MOST_FRICTION).filter(|&i| back[i] != self.modes.slips[i]).collect();
         let is_rigid = system.last_wall(gap, side).contact == Contact::Rigid;
         let last = system.walls(gap, side).len() - 1;
         // The sliding that reversed in each flight ends, or reverses once more.
-        self.modes.slips = series.back;
+        self.modes.slips = back;
         rubs.iter().for_each(|&i| self.record_slip(i, SlipKind::Reversal, observer));
         self.note_before();
         self.jumps.clear();
         self.record(gap, EventKind::MeshStart, side, last, Some(side), observer);
         if !is_rigid {
             rubs.iter().for_each(|&i| self.record_slip(i, SlipKind::Reversal, observer));
-            (next.gaps[gap], next.slips) = (GapMode::Pressed(side), series.back);
+            (next.gaps[gap], next.slips) = (GapMode::Pressed(side), back);
             rubs.iter().for_each(|&i| self.roots.from_rate[i] = 2);
         }
         self.modes.gaps[gap] = next.gaps[gap];

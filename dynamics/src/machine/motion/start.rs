@@ -15,8 +15,8 @@ const GAP_ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// The modes of a motion, and the sides of its last events.
 #[derive(Clone, Debug)]
 pub(crate) struct CarriedModes {
-    modes: Modes,
-    origin: [Option<Side>; MOST_GAPS],
+    pub(super) modes: Modes,
+    pub(super) origin: [Option<Side>; MOST_GAPS],
 }
 
 impl<'s> MachineMotion<'s> {
@@ -54,6 +54,7 @@ impl<'s> MachineMotion<'s> {
             log_scale: 0.0,
             before: [0.0; SIZE],
             jumps: Vec::new(),
+            passages: None,
             events_in_period: 0,
             steps_in_period: 0,
             contact_time: 0.0,
@@ -110,7 +111,7 @@ impl<'s> MachineMotion<'s> {
         started
     }
 
-    fn take_modes(&mut self, carried: &CarriedModes) {
+    pub(super) fn take_modes(&mut self, carried: &CarriedModes) {
         let (system, modes) = (self.system, &carried.modes);
         self.forget_watches();
         self.origin = carried.origin;

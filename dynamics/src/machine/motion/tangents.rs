@@ -73,8 +73,8 @@ impl MachineMotion<'_> {
         let jump = |u: &[f64]| {
             let mut after = [0.0; SIZE];
             after[..2 * n].copy_from_slice(&u[..2 * n]);
-            for (gap, change) in &jumps {
-                let rate = after[n + gap];
+            for (impulse, change) in &jumps {
+                let rate = after[n + impulse.gap];
                 after[n..2 * n].iter_mut().zip(change).for_each(|(after, change)| *after -= change * rate);
             }
             after

@@ -1,0 +1,410 @@
+//! Cycles as boundary value problems.
+//!
+//! A cycle is a sequence of flights in known modes. Its unknowns are the state at phase 0, and the state and time at the end of each flight.
+//! Its equations are the exact flights, the jumps of impacts, one condition at each event (a gap is on its wall, a force or a rate is 0), and
+//! closure. These equations stay regular where the strobe map is not: unstable cycles, however large their multipliers are, and grazing. The
+//! engine of machines supplies the modes, and rows of accelerations and conditions; see [`passages`](crate::machine::Passage).
+//!
+//! Derivatives are exact: those of flights by the state are their propagators, those by parameters solve the variational equations. The
+//! coefficients of a model at other values of a parameter give the derivatives of coefficients.
+
+mod branch;
+mod equations;
+mod family;
+mod flight;
+
+pub use branch::{Branch, BranchEnd, BranchLimits, BranchPoint, Special, SpecialPoint, follow, follow_on};
+pub use family::Free;
+
+use std::f64::consts::TAU;
+
+use equations::Linearised;
+use nalgebra::{DMatrix, DVector, RowDVector};
+
+use crate::machine::{MachineMotion, Passage, System};
+use crate::model::{Model, ModelError, State, Timing};
+use crate::motion::{GapEvent, Observer, SlipEvent, States, Stop};
+use crate::word::Word;
+
+/// Largest number of Newton steps.
+const MOST_STEPS: usize = 30;
+
+/// Newton's method ends at steps below this, relative to the scales of the unknowns.
+const CONVERGED: f64 = 1e-13;
+
+/// Largest last step of a search that has converged.
+const ACCEPTED: f64 = 1e-9;
+
+/// Largest distance of the motion along a cycle from the solution of its equations, relative to the scales of the unknowns. Near a graze the
+/// motion's times have the square root of rounding errors.
+const NEAR: f64 = 1e-6;
+
+/// Steps longer than this, relative to the scales of the unknowns, do not lead to a cycle.
+const LONGEST: f64 = 1e3;
+
+/// Pivots and singular values below this, relative to the largest one, are 0: the cycle is one of a family.
+const SINGULAR: f64 = 1e-11;
+
+/// Largest number of sweeps of the singular value iteration.
+const SVD_CAP: usize = 1000;
+
+/// Why a cycle has no equations, or they have no solution.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CycleError {
+    /// The model does not allow the values of its parameters.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The motion cannot be continued.
+    #[error("the motion along the cycle ends: {0:?}")]
+    Stop(Stop),
+    /// A flight needs too many steps.
+    #[error("a flight of the cycle is too stiff")]
+    TooStiff,
+    /// Newton's method has not converged.
+    #[error("Newton's method does not converge")]
+    Diverges,
+}
+
+/// The sequence of flights of a cycle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Itinerary {
+    passages: Vec<Passage>,
+    /// Whether the sequence is the first half of a cycle that is its own mirror image.
+    mirrored: bool,
+}
+
+/// A solution of the equations of a cycle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// State `(x1 .. xn, v1 .. vn)` at phase 0.
+    start: DVector<f64>,
+    /// State before the end of each flight, and its time in forcing periods.
+    ends: Vec<DVector<f64>>,
+    turns: Vec<f64>,
+    /// Values of the free numbers.
+    values: DVector<f64>,
+}
+
+/// One more equation: its derivatives by all unknowns, and its residual.
+type Extra = (RowDVector<f64>, f64);
+
+impl Itinerary {
+    /// Follows the motion from a state at phase 0 for a number of half forcing periods. If the number is odd, the cycle is its own mirror image.
+    ///
+    /// # Errors
+    /// [`CycleError`] if the motion ends.
+    pub fn of(
+        model: &dyn Model,
+        state: &State,
+        half_periods: u32,
+    ) -> Result<(Itinerary, Solution), CycleError> {
+        let oscillator = model.oscillator()?;
+        let system = System::new(&oscillator);
+        let passages = MachineMotion::new(&system, state).passages(half_periods).map_err(CycleError::Stop)?;
+        let in_blocks = |state: &State| in_blocks(state, system.degrees());
+        let is_free = oscillator.timing == Timing::Cycle;
+        let solution = Solution {
+            start: in_blocks(state),
+            ends: passages.iter().map(|passage| in_blocks(&passage.state)).collect(),
+            turns: passages.iter().map(|passage| passage.turns).collect(),
+            values: DVector::from_iterator(usize::from(is_free), is_free.then(|| system.period())),
+        };
+        Ok((Itinerary { passages, mirrored: half_periods % 2 == 1 }, solution))
+    }
+
+    /// Whether another cycle has the same flights.
+    pub fn is_like(&self, other: &Itinerary) -> bool {
+        let alike = |(a, b): (&Passage, &Passage)| a.is_like(b);
+        self.mirrored == other.mirrored
+            && self.passages.len() == other.passages.len()
+            && self.passages.iter().zip(&other.passages).all(alike)
+    }
+
+    fn half_periods(&self, system: &System) -> u32 {
+        (2.0 * self.passages.last().map_or(0.0, |last| system.known_turns(last))) as u32
+    }
+
+    /// Returns the word of the cycle.
+    ///
+    /// # Errors
+    /// [`CycleError`] if the motion along the cycle ends.
+    pub fn word(&self, model: &dyn Model, solution: &Solution) -> Result<Word, CycleError> {
+        let free = own(model)?;
+        let system = System::new(
+            &placed(model, &free, &solution.values.rows(0, free.len()).into_owned()).oscillator()?,
+        );
+        // The symbol of the first flight depends on the last event of the cycle.
+        let (mut before, mut symbols) = (None, Symbols(Vec::new()));
+        for _ in 0..2 {
+            let start = MachineMotion::new(&system, &solution.state());
+            let mut motion = start.in_modes(&self.passages[0], before.as_ref());
+            symbols.0.clear();
+            for _ in 0..self.half_periods(&system) / 2 {
+                motion.advance_period(&mut symbols).map_err(CycleError::Stop)?;
+            }
+            before = Some(motion);
+        }
+        Ok(Word::cyclic(&symbols.0))
+    }
+
+    /// Whether the motion from the state of a solution, in the modes of the first flight, has this sequence of flights. A solution for which
+    /// this is not so is no cycle of the model: it passes through a wall, for example.
+    pub fn is_followed(&self, model: &dyn Model, solution: &Solution) -> bool {
+        let Ok(oscillator) = model.oscillator() else { return false };
+        let system = System::new(&oscillator);
+        let half_periods = self.half_periods(&system);
+        let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
+        let Ok(passages) = motion.passages(half_periods) else { return false };
+        let Ok(scales) = self.scales(model, solution, &[]) else { return false };
+        let is_near = |(passage, end): (&Passage, &DVector<f64>)| {
+            let difference = in_blocks(&passage.state, system.degrees()) - end;
+            difference.iter().zip(&scales).all(|(x, scale)| x.abs() <= NEAR * scale)
+        };
+        passages.iter().zip(&solution.ends).all(is_near)
+            && self.is_like(&Itinerary { passages, mirrored: self.mirrored })
+    }
+
+    /// Returns the sequence of flights, and its approximate solution, without an event at a graze: without an impact, or without the beginning
+    /// and the end of a contact. `nth`: the place among all events.
+    fn without(&self, nth: usize, solution: &Solution) -> Option<(Itinerary, Solution)> {
+        let mut places = self.passages.iter().enumerate().filter(|(_, passage)| passage.is_event());
+        let (at, _) = places.nth(nth)?;
+        let is_back = |count: &usize| {
+            let next = self.passages.get(at + count);
+            next.is_some_and(|next| next.has_modes_of(&self.passages[at]))
+        };
+        let left_out = at..at + (1..=2).find(is_back)?;
+        let (mut shorter, mut seed) = (self.clone(), solution.clone());
+        shorter.passages.drain(left_out.clone());
+        seed.ends.drain(left_out.clone());
+        seed.turns.drain(left_out);
+        Some((shorter, seed))
+    }
+
+    /// Returns the number of events.
+    pub fn events(&self) -> usize {
+        self.passages.iter().filter(|passage| passage.is_event()).count()
+    }
+
+    /// Solves the equations by Newton's method from a nearby solution. The time of a cycle without force is an unknown, too.
+    ///
+    /// # Errors
+    /// [`CycleError`] if the method does not converge.
+    pub fn solve(&self, model: &dyn Model, from: &Solution) -> Result<Solution, CycleError> {
+        let free = own(model)?;
+        let scales = self.scales(model, from, &free)?;
+        let extra = |linearised: &Linearised, _: &Solution| phase(linearised, &free);
+        Ok(self.newton(model, from.clone(), &free, &scales, &extra)?.0)
+    }
+
+    /// Solves the equations together with others for as many free numbers.
+    fn newton(
+        &self,
+        model: &dyn Model,
+        mut at: Solution,
+        free: &[Free],
+        scales: &[f64],
+        extra: &dyn Fn(&Linearised, &Solution) -> Vec<Extra>,
+    ) -> Result<(Solution, usize), CycleError> {
+        for count in 1.. {
+            let linearised = self.linearise(&*placed(model, free, &at.values), &at, free)?;
+            let (matrix, residual) = linearised.with(&extra(&linearised, &at));
+            let step = solve_scaled(&matrix, &-residual, scales).ok_or(CycleError::Diverges)?;
+            let length =
+                step.iter().zip(scales).fold(0.0, |most: f64, (x, scale)| most.max((x / scale).abs()));
+            if !(length <= LONGEST) {
+                return Err(CycleError::Diverges);
+            }
+            linearised.change(&mut at, self, &step);
+            if length <= CONVERGED || count == MOST_STEPS && length <= ACCEPTED {
+                return Ok((at, count));
+            }
+            if count == MOST_STEPS {
+                break;
+            }
+        }
+        Err(CycleError::Diverges)
+    }
+
+    /// Returns the scales of the unknowns: displacements, velocities, times of events, and free numbers.
+    fn scales(&self, model: &dyn Model, at: &Solution, free: &[Free]) -> Result<Vec<f64>, CycleError> {
+        let oscillator = placed(model, free, &at.values).oscillator()?;
+        let (n, omega) = (at.start.len() / 2, TAU / oscillator.period());
+        let entries = at.start.iter().enumerate().map(|(i, x)| if i < n { x.abs() } else { x.abs() / omega });
+        let length = entries.fold(oscillator.length_scale(), f64::max);
+        let of_state = (0..2 * n).map(|i| if i < n { length } else { length * omega });
+        let of_free = free.iter().zip(&at.values).map(|(free, value)| free.scale(model, *value));
+        Ok(of_state.chain((0..self.events()).map(|_| 1.0)).chain(of_free).collect())
+    }
+
+    /// Returns the derivative of the map over the sequence of flights: of the state after it by the state at phase 0. Of a cycle that is its own
+    /// mirror image, it is the derivative of the reflected map over half the cycle.
+    ///
+    /// # Errors
+    /// [`CycleError`] if the model is not valid, or a flight is too stiff.
+    pub fn monodromy(&self, model: &dyn Model, at: &Solution) -> Result<DMatrix<f64>, CycleError> {
+        let free = own(model)?;
+        Ok(self.linearise(&*placed(model, &free, &at.values), at, &[])?.monodromy)
+    }
+
+    /// Returns the derivatives of the state at phase 0 and of the times of all ends, in forcing periods, by parameters: one column for each.
+    ///
+    /// # Errors
+    /// [`CycleError`] if the model is not valid, or the cycle is at a fold.
+    pub fn derivatives(
+        &self,
+        model: &dyn Model,
+        at: &Solution,
+        parameters: &[usize],
+    ) -> Result<[DMatrix<f64>; 2], CycleError> {
+        let own = own(model)?;
+        let free: Vec<Free> =
+            own.iter().copied().chain(parameters.iter().map(|&index| Free::Parameter(index))).collect();
+        let linearised = self.linearise(&*placed(model, &own, &at.values), at, &free)?;
+        let (matrix, _) = linearised.with(&phase(&linearised, &own));
+        let all = matrix.nrows();
+        let scales = self.scales(model, at, &own)?;
+        let mut unknowns = DMatrix::zeros(all + parameters.len(), parameters.len());
+        for j in 0..parameters.len() {
+            let right = -matrix.column(all + j);
+            let change = solve_scaled(&matrix.columns(0, all).into_owned(), &right, &scales)
+                .ok_or(CycleError::Diverges)?;
+            unknowns.view_mut((0, j), (all, 1)).copy_from(&change);
+            unknowns[(all + j, j)] = 1.0;
+        }
+        Ok([unknowns.rows(0, at.start.len()).into_owned(), linearised.turns() * &unknowns])
+    }
+}
+
+/// The symbols of a motion in order of time.
+struct Symbols(Vec<u8>);
+
+impl Observer for Symbols {
+    fn event(&mut self, event: &GapEvent, _: States<'_>) {
+        self.0.extend(event.symbol);
+    }
+
+    fn slip(&mut self, event: &SlipEvent) {
+        self.0.extend(event.symbol);
+    }
+}
+
+/// Converts a state `(x1, v1, ...)` to `(x1 .. xn, v1 .. vn)`.
+fn in_blocks(state: &State, n: usize) -> DVector<f64> {
+    DVector::from_fn(2 * n, |i, _| if i < n { state[2 * i] } else { state[2 * (i - n) + 1] })
+}
+
+/// Returns the free numbers of a model's cycles: the time of a cycle without force.
+fn own(model: &dyn Model) -> Result<Vec<Free>, CycleError> {
+    let is_free = model.oscillator()?.timing == Timing::Cycle;
+    Ok(is_free.then_some(Free::CycleTime).into_iter().collect())
+}
+
+/// Returns the model with values of free numbers.
+fn placed(model: &dyn Model, free: &[Free], values: &DVector<f64>) -> Box<dyn Model> {
+    let mut model = model.clone_model();
+    free.iter().zip(values).for_each(|(free, value)| free.place(&mut *model, *value));
+    model
+}
+
+/// Returns the equation that fixes phase 0 of a cycle without force: the state moves across the flow only.
+fn phase(linearised: &Linearised, free: &[Free]) -> Vec<Extra> {
+    let count = linearised.matrix.ncols();
+    let row = || linearised.rates.transpose().resize_horizontally(count, 0.0);
+    free.contains(&Free::CycleTime).then(|| (row(), 0.0)).into_iter().collect()
+}
+
+impl Solution {
+    /// Returns the state `(x1, v1, ...)` at phase 0.
+    pub fn state(&self) -> State {
+        let n = self.start.len() / 2;
+        let mut state = crate::model::REST;
+        for i in 0..n {
+            (state[2 * i], state[2 * i + 1]) = (self.start[i], self.start[n + i]);
+        }
+        state
+    }
+
+    /// Returns all unknowns: the state at phase 0, the times of events, and the free numbers.
+    fn unknowns(&self, itinerary: &Itinerary) -> DVector<f64> {
+        let events = itinerary.passages.iter().zip(&self.turns).filter(|(passage, _)| passage.is_event());
+        let all: Vec<f64> =
+            self.start.iter().chain(events.map(|(_, turns)| turns)).chain(&self.values).copied().collect();
+        DVector::from_vec(all)
+    }
+
+    /// Returns the times of the ends of all flights since phase 0, in forcing periods.
+    pub fn turns(&self) -> &[f64] {
+        &self.turns
+    }
+
+    /// Returns the values of the free numbers.
+    pub fn values(&self) -> &[f64] {
+        self.values.as_slice()
+    }
+}
+
+/// Solves linear equations whose unknowns have given scales. Among several solutions returns the smallest one.
+fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>, scales: &[f64]) -> Option<DVector<f64>> {
+    let (rows, columns) = matrix.shape();
+    let mut scaled = DMatrix::from_fn(rows, columns, |i, j| matrix[(i, j)] * scales[j]);
+    let mut right = right.clone();
+    for (i, mut row) in scaled.row_iter_mut().enumerate() {
+        let size = row.amax();
+        if size > 0.0 {
+            row /= size;
+            right[i] /= size;
+        }
+    }
+    if !scaled.iter().chain(&right).all(|x| x.is_finite()) {
+        return None;
+    }
+    let lu = scaled.clone().full_piv_lu();
+    let pivots = lu.u().diagonal().abs();
+    let solved = if rows == columns && pivots.min() > SINGULAR * pivots.max() {
+        lu.solve(&right)?
+    } else {
+        let svd = scaled.try_svd(true, true, f64::EPSILON, SVD_CAP)?;
+        let cutoff = SINGULAR * svd.singular_values.max();
+        svd.solve(&right, cutoff).ok()?
+    };
+    Some(DVector::from_fn(columns, |j, _| solved[j] * scales[j]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{GearPair, REST};
+    use crate::motion::{Flow, Trajectory};
+    use crate::stability::{StrobeMap, refine};
+
+    /// Returns a cycle by Newton's method on the strobe map.
+    fn refined(model: &dyn Model, periods: u32) -> crate::stability::Cycle {
+        let flow = Flow::of(model).unwrap();
+        let mut motion = Trajectory::new(&flow, model.law(), REST);
+        (0..60).for_each(|_| motion.advance_period(&mut ()).unwrap());
+        refine(&motion, StrobeMap::Periods(periods)).unwrap()
+    }
+
+    #[test]
+    fn cycles_and_multipliers_agree_with_the_strobe_map() {
+        for e in [0.06, 0.3, 0.45, 0.58] {
+            let pair = GearPair::paper(e);
+            let cycle = refined(&pair, 1);
+            let (itinerary, seed) = Itinerary::of(&pair, &cycle.state, 2).unwrap();
+            let solution = itinerary.solve(&pair, &seed).unwrap();
+            for (a, b) in solution.state().into_iter().zip(cycle.state) {
+                assert!((a - b).abs() < 1e-12, "e = {e}: {:?}, {:?}", solution.state(), cycle.state);
+            }
+            let found =
+                crate::stability::multipliers(&itinerary.monodromy(&pair, &solution).unwrap()).unwrap();
+            for (a, b) in found.iter().zip(&cycle.multipliers) {
+                assert!(
+                    (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9,
+                    "e = {e}: {found:?}, {:?}",
+                    cycle.multipliers
+                );
+            }
+        }
+    }
+}

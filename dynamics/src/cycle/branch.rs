@@ -1,0 +1,434 @@
+//! Branches of cycles over one parameter, through folds, by pseudo-arclength continuation (Keller 1977).
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nalgebra::{DVector, RowDVector};
+
+use super::equations::Linearised;
+use super::{CycleError, Free, Itinerary, Solution, own, phase, placed, solve_scaled};
+use crate::machine::System;
+use crate::model::Model;
+use crate::stability::multipliers;
+use crate::word::Word;
+
+/// Largest number of Newton steps after which steps of the branch become longer.
+const FEW_STEPS: usize = 4;
+
+/// Cosine of the angle between two tangents above which steps become longer, and below which they are repeated at half the length.
+const STRAIGHT: f64 = 0.995;
+const BENT: f64 = 0.9;
+
+/// Largest number of steps of a search for a special point, and its accuracy relative to the scales of the unknowns.
+const MOST_HALVINGS: usize = 60;
+const LOCATED: f64 = 1e-13;
+
+/// Largest product of distances from -1 at a flip.
+const AT_FLIP: f64 = 1e-6;
+
+/// Largest number of parts of a branch.
+const MOST_PARTS: usize = 64;
+
+/// Differences of the parameter, relative to its range, at which a branch goes on beyond a change of its sequence of flights.
+const BEYOND: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+
+/// Step that shows in which direction events become faster.
+const SHORT_STEP: f64 = 1e-6;
+
+/// Limits of a branch. Lengths are relative to the scales of the unknowns, in which the parameter's range has the length 1.
+#[derive(Clone, Copy, Debug)]
+pub struct BranchLimits<'h> {
+    /// First, least and largest length of a step.
+    pub steps: [f64; 3],
+    /// Largest number of points of a part.
+    pub points: usize,
+    /// The branch ends when this is raised.
+    pub halt: &'h AtomicBool,
+}
+
+impl<'h> BranchLimits<'h> {
+    /// Returns limits for branches over the whole range of a parameter.
+    pub fn new(halt: &'h AtomicBool) -> BranchLimits<'h> {
+        BranchLimits { steps: [1e-3, 1e-9, 2e-2], points: 2000, halt }
+    }
+}
+
+/// A cycle on a branch.
+#[derive(Clone, Debug)]
+pub struct BranchPoint {
+    /// The cycle.
+    pub solution: Solution,
+    /// Value of the parameter.
+    pub value: f64,
+    /// Floquet multipliers `[re, im]` of the map over the itinerary, largest modulus first.
+    pub multipliers: Vec<[f64; 2]>,
+    /// Length of the branch from its start.
+    pub arclength: f64,
+    /// Unit tangent in scaled unknowns.
+    tangent: DVector<f64>,
+    /// Rates at which the function of each event falls.
+    approaches: Vec<f64>,
+}
+
+/// What happens at a special point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Special {
+    /// The branch turns back: a multiplier is 1.
+    Fold,
+    /// A multiplier is -1: the period doubles. Of a cycle that is its own mirror image, the symmetry breaks.
+    Flip,
+    /// An event disappears: its function only touches 0.
+    Grazing,
+    /// A new event begins, or the sequence of flights changes in another way.
+    Border,
+}
+
+/// A special point of a branch.
+#[derive(Clone, Debug)]
+pub struct SpecialPoint {
+    /// What happens.
+    pub kind: Special,
+    /// The cycle.
+    pub at: BranchPoint,
+}
+
+/// Why a branch ends.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BranchEnd {
+    /// The parameter leaves its range.
+    Range,
+    /// The sequence of flights changes.
+    Border,
+    /// Newton's method fails even for the shortest step.
+    Failed(CycleError),
+    /// The number of points is at its limit.
+    Points,
+    /// The computation was halted.
+    Halted,
+}
+
+/// A part of a branch along which the sequence of flights is the same.
+#[derive(Clone, Debug)]
+pub struct Branch {
+    /// The word of its cycles.
+    pub word: Word,
+    /// The cycles, in order.
+    pub points: Vec<BranchPoint>,
+    /// Special points, in order.
+    pub special: Vec<SpecialPoint>,
+    /// Why it ends.
+    pub end: BranchEnd,
+}
+
+/// What stays the same along a branch.
+struct Along<'a> {
+    model: &'a dyn Model,
+    itinerary: &'a Itinerary,
+    free: Vec<Free>,
+    scales: Vec<f64>,
+}
+
+/// Follows the branch of a cycle over a parameter within a range, in one direction: towards larger values at first if `rises`.
+///
+/// # Errors
+/// [`CycleError`] if the first cycle has no solution.
+pub fn follow(
+    model: &dyn Model,
+    itinerary: &Itinerary,
+    from: &Solution,
+    parameter: usize,
+    (range, rises): ([f64; 2], bool),
+    limits: &BranchLimits<'_>,
+) -> Result<Branch, CycleError> {
+    let mut free = own(model)?;
+    free.push(Free::Parameter(parameter));
+    let mut start = itinerary.solve(model, from)?;
+    start.values = start.values.push(model.value(parameter));
+    let mut scales = itinerary.scales(model, &start, &free)?;
+    *scales.last_mut().expect("the parameter is an unknown") = range[1] - range[0];
+    let along = Along { model, itinerary, free, scales };
+    let mut ahead = DVector::zeros(along.scales.len());
+    *ahead.as_mut_slice().last_mut().expect("the parameter is an unknown") = if rises { 1.0 } else { -1.0 };
+    let mut now = along.point(start, &ahead, 0.0)?;
+    let word = itinerary.word(model, &now.0.solution)?;
+    let mut branch =
+        Branch { word, points: vec![now.0.clone()], special: Vec::new(), end: BranchEnd::Points };
+    let [mut length, least, largest] = limits.steps;
+    while branch.points.len() < limits.points {
+        if limits.halt.load(Ordering::Relaxed) {
+            branch.end = BranchEnd::Halted;
+            break;
+        }
+        let next = match along.next(&now, length) {
+            Ok((next, count)) => {
+                let cosine = now.0.tangent.dot(&next.0.tangent);
+                if cosine < BENT && length > least {
+                    length *= 0.5;
+                    continue;
+                }
+                let is_easy = cosine > STRAIGHT && count <= FEW_STEPS;
+                length = (length * if is_easy { 1.5 } else { 1.0 }).min(largest);
+                next
+            }
+            Err(_) if length > least => {
+                length *= 0.5;
+                continue;
+            }
+            Err(error) => {
+                branch.end = BranchEnd::Failed(error);
+                break;
+            }
+        };
+        let passed = next.0.arclength - now.0.arclength;
+        let mut border = None;
+        for event in 0..now.0.approaches.len() {
+            let test = |point: &BranchPoint| point.approaches[event];
+            let found =
+                (test(&now.0) * test(&next.0) < 0.0).then(|| along.locate(&now, passed, &test)).flatten();
+            let is_first = |at: &BranchPoint| {
+                border.as_ref().is_none_or(|(_, first): &(_, BranchPoint)| at.arclength < first.arclength)
+            };
+            if let Some(at) = found.filter(is_first) {
+                border = Some((Special::Grazing, at));
+            }
+        }
+        if border.is_none() && !along.is_admissible(&next.0) {
+            border = Some((Special::Border, along.last_admissible(&now, passed)));
+        }
+        for (kind, test) in [(Special::Fold, fold as fn(&BranchPoint) -> f64), (Special::Flip, flip)] {
+            let found =
+                (test(&now.0) * test(&next.0) < 0.0).then(|| along.locate(&now, passed, &test)).flatten();
+            let is_before =
+                |at: &BranchPoint| border.as_ref().is_none_or(|(_, end)| at.arclength < end.arclength);
+            // A multiplier that passes infinity at a graze changes the sign of the product, too.
+            let is_there = |at: &BranchPoint| {
+                (range[0]..=range[1]).contains(&at.value)
+                    && (kind == Special::Fold || flip(at).abs() < AT_FLIP)
+            };
+            branch
+                .special
+                .extend(found.filter(is_before).filter(is_there).map(|at| SpecialPoint { kind, at }));
+        }
+        let border = border.filter(|(_, at)| (range[0]..=range[1]).contains(&at.value));
+        if let Some((kind, at)) = border {
+            branch.points.push(at.clone());
+            branch.special.push(SpecialPoint { kind, at });
+            branch.end = BranchEnd::Border;
+            break;
+        }
+        if let Some(end) =
+            range.into_iter().zip([-1.0, 1.0]).find(|(end, side)| side * (next.0.value - end) > 0.0)
+        {
+            let at_end = |point: &BranchPoint| point.value - end.0;
+            branch
+                .points
+                .extend((at_end(&now.0) != 0.0).then(|| along.locate(&now, passed, &at_end)).flatten());
+            branch.end = BranchEnd::Range;
+            break;
+        }
+        branch.points.push(next.0.clone());
+        now = next;
+    }
+    branch.special.sort_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
+    Ok(branch)
+}
+
+/// Follows a branch like [`follow`], and on with other sequences of flights where the sequence changes. Returns its parts in order.
+///
+/// # Errors
+/// [`CycleError`] if the first cycle has no solution.
+pub fn follow_on(
+    model: &dyn Model,
+    itinerary: &Itinerary,
+    from: &Solution,
+    parameter: usize,
+    direction: ([f64; 2], bool),
+    limits: &BranchLimits<'_>,
+) -> Result<Vec<Branch>, CycleError> {
+    let mut parts = vec![follow(model, itinerary, from, parameter, direction, limits)?];
+    let mut itinerary = itinerary.clone();
+    while parts.len() < MOST_PARTS
+        && let Some(part) = parts.last()
+        && let (BranchEnd::Border, Some(at)) = (&part.end, part.points.last())
+        && let Some((next, seed, side)) = successor(model, &itinerary, at, parameter, direction.0)
+    {
+        let mut moved = model.clone_model();
+        moved.assign(parameter, at.value + side);
+        let (range, away) = (direction.0, side > 0.0);
+        // Events that begin at a graze become faster, whether the parameter rises or falls.
+        let rises = match next.events() > itinerary.events() {
+            true => steepens(&*moved, &next, &seed, parameter, (range, limits)).unwrap_or(away),
+            false => away,
+        };
+        parts.push(follow(&*moved, &next, &seed, parameter, (range, rises), limits)?);
+        itinerary = next;
+    }
+    Ok(parts)
+}
+
+/// Returns whether the slowest event of a cycle becomes faster where the parameter rises; none if that is not known.
+fn steepens(
+    model: &dyn Model,
+    itinerary: &Itinerary,
+    from: &Solution,
+    parameter: usize,
+    (range, limits): ([f64; 2], &BranchLimits<'_>),
+) -> Option<bool> {
+    let limits = BranchLimits { steps: [SHORT_STEP; 3], points: 2, ..*limits };
+    let slowest = |rises: bool| {
+        let branch = follow(model, itinerary, from, parameter, (range, rises), &limits).ok()?;
+        branch.points.get(1)?.approaches.iter().map(|x| x.abs()).min_by(f64::total_cmp)
+    };
+    Some(slowest(true)? > slowest(false)?)
+}
+
+/// Finds a cycle with another sequence of flights near the end of a part of a branch, at a slightly different value of the parameter. Returns
+/// its sequence, the cycle, and the difference of the parameter.
+fn successor(
+    model: &dyn Model,
+    itinerary: &Itinerary,
+    at: &BranchPoint,
+    parameter: usize,
+    range: [f64; 2],
+) -> Option<(Itinerary, Solution, f64)> {
+    let (values, own_count) = (&at.solution.values, at.solution.values.len() - 1);
+    let mut seed = at.solution.clone();
+    seed.values = values.rows(0, own_count).into_owned();
+    let free = own(model).ok()?;
+    let away = if fold(at) < 0.0 { -1.0 } else { 1.0 };
+    let differences =
+        BEYOND.into_iter().flat_map(|share| [away, -away].map(|sign| sign * share * (range[1] - range[0])));
+    for difference in differences {
+        let mut moved = placed(model, &free, &seed.values);
+        moved.assign(parameter, at.value + difference);
+        let Ok(oscillator) = moved.oscillator() else { continue };
+        let half_periods = itinerary.half_periods(&System::new(&oscillator));
+        let run = Itinerary::of(&*moved, &seed.state(), half_periods).ok();
+        let grazing = at.approaches.iter().enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let shorter = grazing.and_then(|(nth, _)| itinerary.without(nth, &seed));
+        for (next, start) in run.into_iter().chain(shorter) {
+            if !next.is_like(itinerary)
+                && let Ok(solution) = next.solve(&*moved, &start)
+                && next.is_followed(&*placed(&*moved, &free, &solution.values), &solution)
+            {
+                return Some((next, solution, difference));
+            }
+        }
+    }
+    None
+}
+
+/// Returns the component of the tangent along the parameter, which is 0 at a fold.
+fn fold(point: &BranchPoint) -> f64 {
+    point.tangent[point.tangent.len() - 1]
+}
+
+/// Returns the product of the distances of all multipliers from -1.
+fn flip(point: &BranchPoint) -> f64 {
+    let of = |[re, im]: &[f64; 2]| if *im == 0.0 { re + 1.0 } else { (re + 1.0).hypot(*im) };
+    point.multipliers.iter().map(of).product()
+}
+
+impl BranchPoint {
+    /// Whether the cycle is stable: all multipliers lie within the unit circle.
+    pub fn is_stable(&self) -> bool {
+        self.multipliers.iter().all(|[re, im]| re.hypot(*im) < 1.0)
+    }
+}
+
+impl Along<'_> {
+    /// Completes a solution to a point whose tangent continues an earlier one.
+    fn point(
+        &self,
+        solution: Solution,
+        before: &DVector<f64>,
+        arclength: f64,
+    ) -> Result<(BranchPoint, Linearised), CycleError> {
+        let model = placed(self.model, &self.free, &solution.values);
+        let linearised = self.itinerary.linearise(&*model, &solution, &self.free)?;
+        let count = before.len();
+        let row = RowDVector::from_fn(count, |_, j| before[j] / self.scales[j]);
+        let mut extra = phase(&linearised, &self.free);
+        extra.push((row, 0.0));
+        let (matrix, mut right) = linearised.with(&extra);
+        right.fill(0.0);
+        right[count - 1] = 1.0;
+        let step = solve_scaled(&matrix, &right, &self.scales).ok_or(CycleError::Diverges)?;
+        let tangent = DVector::from_fn(count, |j, _| step[j] / self.scales[j]).normalize();
+        let multipliers = multipliers(&linearised.monodromy).ok_or(CycleError::Diverges)?;
+        let value = solution.values[solution.values.len() - 1];
+        let approaches = linearised.approaches.clone();
+        Ok((BranchPoint { solution, value, multipliers, arclength, tangent, approaches }, linearised))
+    }
+
+    /// Returns the point at a distance along the tangent, and the number of Newton steps.
+    fn next(
+        &self,
+        (from, linearised): &(BranchPoint, Linearised),
+        length: f64,
+    ) -> Result<((BranchPoint, Linearised), usize), CycleError> {
+        let mut predicted = from.solution.clone();
+        let scaled = |j: usize| from.tangent[j] * self.scales[j];
+        let step = DVector::from_fn(from.tangent.len(), |j, _| scaled(j) * length);
+        linearised.change(&mut predicted, self.itinerary, &step);
+        let centre = predicted.unknowns(self.itinerary);
+        let row = RowDVector::from_fn(step.len(), |_, j| from.tangent[j] / self.scales[j]);
+        let extra = |linearised: &Linearised, at: &Solution| {
+            let ahead = &row * (at.unknowns(self.itinerary) - &centre);
+            let mut all = phase(linearised, &self.free);
+            all.push((row.clone(), ahead[0]));
+            all
+        };
+        let (solution, count) =
+            self.itinerary.newton(self.model, predicted, &self.free, &self.scales, &extra)?;
+        Ok((self.point(solution, &from.tangent, from.arclength + length)?, count))
+    }
+
+    /// Whether the motion along the cycle has the cycle's sequence of flights.
+    fn is_admissible(&self, point: &BranchPoint) -> bool {
+        let model = placed(self.model, &self.free, &point.solution.values);
+        self.itinerary.is_followed(&*model, &point.solution)
+    }
+
+    /// Returns the point between two distances along the tangent where a test function is 0, by bisection and false position.
+    fn locate(
+        &self,
+        from: &(BranchPoint, Linearised),
+        length: f64,
+        test: &dyn Fn(&BranchPoint) -> f64,
+    ) -> Option<BranchPoint> {
+        let (mut low, mut high) = ((0.0, test(&from.0)), (length, test(&self.next(from, length).ok()?.0.0)));
+        let mut found = None;
+        for nth in 0..MOST_HALVINGS {
+            let share = if nth % 3 == 2 { 0.5 } else { low.1 / (low.1 - high.1) };
+            let middle = low.0 + share.clamp(1e-3, 1.0 - 1e-3) * (high.0 - low.0);
+            let point = self.next(from, middle).ok()?.0.0;
+            let value = test(&point);
+            if value * low.1 > 0.0 {
+                low = (middle, value)
+            } else {
+                high = (middle, value)
+            }
+            found = Some(point);
+            if value == 0.0 || high.0 - low.0 <= LOCATED {
+                break;
+            }
+        }
+        found
+    }
+
+    /// Returns the last point before a distance at which the cycle is admissible, by bisection.
+    fn last_admissible(&self, from: &(BranchPoint, Linearised), length: f64) -> BranchPoint {
+        let (mut low, mut high, mut found) = (0.0, length, from.0.clone());
+        for _ in 0..MOST_HALVINGS {
+            let middle = 0.5 * (low + high);
+            match self.next(from, middle) {
+                Ok(((point, _), _)) if self.is_admissible(&point) => (low, found) = (middle, point),
+                _ => high = middle,
+            }
+            if high - low <= LOCATED {
+                break;
+            }
+        }
+        found
+    }
+}

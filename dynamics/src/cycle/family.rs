@@ -1,0 +1,112 @@
+//! The laws of a model as functions of its parameters.
+
+use std::ops::{Add, Mul, Sub};
+
+use crate::machine::System;
+use crate::model::{Model, ModelError};
+
+/// Step of differences, relative to the value of the parameter.
+const STEP: f64 = 3e-3;
+
+/// Number of values of a parameter on either side of its value. With the coefficients of a model, which are smooth functions of its parameters
+/// between kinks, the differences are exact to about `1e-13`.
+const SIDE: usize = 3;
+
+/// A number that the laws of a cycle depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Free {
+    /// The parameter with this index.
+    Parameter(usize),
+    /// The time of a cycle without force.
+    CycleTime,
+}
+
+impl Free {
+    /// Sets the number to a value, which may be out of range.
+    pub(super) fn place(self, model: &mut dyn Model, value: f64) {
+        match self {
+            Free::Parameter(index) => model.assign(index, value),
+            Free::CycleTime => model.set_cycle_time(value),
+        }
+    }
+
+    /// Returns the scale of changes: the smaller one of the sizes of the value and of the parameter's default.
+    pub(super) fn scale(self, model: &dyn Model, value: f64) -> f64 {
+        let default = match self {
+            Free::Parameter(index) => model.parameters()[index].default.unwrap_or(0.0),
+            Free::CycleTime => 0.0,
+        };
+        [value.abs(), default.abs()].into_iter().filter(|size| *size > 0.0).reduce(f64::min).unwrap_or(1.0)
+    }
+}
+
+/// The laws of a model with given values, and near them.
+#[derive(Debug)]
+pub(super) struct Laws {
+    pub(super) system: System,
+    /// For each free number, systems at other values of it, with their weights in the derivative.
+    nearby: Vec<Vec<(f64, System)>>,
+}
+
+impl Laws {
+    /// Computes the laws of a model, and their derivatives by `free`.
+    pub(super) fn new(model: &dyn Model, free: &[Free]) -> Result<Laws, ModelError> {
+        let system = System::new(&model.oscillator()?);
+        let nearby = free.iter().map(|&free| nearby(model, &system, free)).collect::<Result<_, _>>()?;
+        Ok(Laws { system, nearby })
+    }
+
+    /// Returns the number of free numbers.
+    pub(super) fn free(&self) -> usize {
+        self.nearby.len()
+    }
+
+    /// Returns the derivative of a function of the laws by a free number. What does not depend on this number has the derivative 0 exactly.
+    pub(super) fn slope<T>(&self, free: usize, of: impl Fn(&System) -> T) -> T
+    where
+        T: Clone + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
+    {
+        let here = of(&self.system);
+        let terms = self.nearby[free].iter().map(|(weight, system)| (of(system) - here.clone()) * *weight);
+        terms.reduce(Add::add).expect("a stencil has places")
+    }
+}
+
+/// Returns the systems of a stencil around the value of a free number. At an end of the parameter's range all lie on one side.
+fn nearby(model: &dyn Model, system: &System, free: Free) -> Result<Vec<(f64, System)>, ModelError> {
+    let (value, [least, most]) = match free {
+        Free::CycleTime => (system.period(), [0.0, f64::INFINITY]),
+        Free::Parameter(index) => (model.value(index), model.parameters()[index].range.ends()),
+    };
+    let h = STEP * free.scale(model, value);
+    let reach = SIDE as f64 * h;
+    let first = if value - reach < least {
+        0.0
+    } else if value + reach > most {
+        -2.0 * reach
+    } else {
+        -reach
+    };
+    let offsets: Vec<f64> = (0..=2 * SIDE).map(|k| first + k as f64 * h).collect();
+    let mut systems = Vec::new();
+    for (k, offset) in offsets.iter().enumerate() {
+        let weight = slope_at_zero(&offsets, k);
+        if weight == 0.0 {
+            continue;
+        }
+        let mut moved = model.clone_model();
+        free.place(&mut *moved, value + offset);
+        systems.push((weight, System::new(&moved.oscillator()?)));
+    }
+    Ok(systems)
+}
+
+/// Returns the derivative at 0 of the polynomial that is 1 at one place and 0 at the others.
+fn slope_at_zero(places: &[f64], one: usize) -> f64 {
+    let others = || (0..places.len()).filter(|&k| k != one);
+    let term = |left_out: usize| {
+        let factor = |k: usize| -places[k] / (places[one] - places[k]);
+        others().filter(|&k| k != left_out).map(factor).product::<f64>() / (places[one] - places[left_out])
+    };
+    others().map(term).sum()
+}

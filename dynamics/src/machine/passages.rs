@@ -1,0 +1,210 @@
+//! What a motion passes on its way: flights and what ends them. They are the equations of a cycle.
+//!
+//! The functions here are linear in points `(x1 .. xn, v1 .. vn, cos, sin, ..., 1)` in the coordinates of the model. Unlike the coordinates of
+//! the flow, these do not depend on the values of parameters.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::domain::Functional;
+use super::domains::System;
+use super::impact::Impact;
+use super::modes::Modes;
+use super::motion::SeriesModes;
+use super::watch::{Moment, Roots, Watch};
+use super::{Numbers, WIDTH};
+use crate::model::{MOST_GAPS, Side};
+
+/// How an impact changes the gap's rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Bounce {
+    /// The gap leaves its wall by the law of restitution.
+    Leaves,
+    /// The gap stops on its wall.
+    Stops,
+    /// The rest of a series of impacts is one flight.
+    Ends,
+}
+
+/// An impact of a gap, while walls hold other gaps at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Impulse {
+    pub(super) gap: usize,
+    pub(super) side: Side,
+    pub(super) held: [bool; MOST_GAPS],
+    pub(super) bounce: Bounce,
+}
+
+/// What ends a flight.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum End {
+    /// The root of a watch, and the impacts there.
+    Event(Watch, Vec<Impulse>),
+    /// The limit of a series of infinitely many impacts. The gap is at rest on its wall during the flight.
+    Series(SeriesModes),
+    /// The change of the stage with this place in the schedule.
+    Stage(usize),
+    /// A forcing period ends.
+    Period,
+    /// Half a forcing period ends.
+    Half,
+}
+
+/// A flight and its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Passage {
+    pub(super) modes: Modes,
+    pub(super) end: End,
+    /// Number of completed forcing periods.
+    pub(super) period: u64,
+    /// Time of the end since the motion's start, in forcing periods.
+    pub turns: f64,
+    /// State `(x1, v1, ...)` before the end.
+    pub state: Numbers,
+}
+
+impl Passage {
+    /// Whether the time of the end is a root of [`System::condition`]. Otherwise the time is known.
+    pub fn is_event(&self) -> bool {
+        matches!(self.end, End::Event(..))
+    }
+
+    /// Whether the end is the limit of a series of infinitely many impacts.
+    pub fn is_series(&self) -> bool {
+        matches!(self.end, End::Series(_))
+    }
+
+    /// Whether another flight has the same modes.
+    pub(crate) fn has_modes_of(&self, other: &Passage) -> bool {
+        self.modes == other.modes
+    }
+
+    /// Whether the same modes end in the same way.
+    pub fn is_like(&self, other: &Passage) -> bool {
+        (&self.modes, &self.end) == (&other.modes, &other.end)
+    }
+}
+
+/// The change of the rates by an impact: the rate of the gap is changed by `change`, which has the derivative `slope` by this rate, and all
+/// other rates by multiples of this.
+pub(crate) struct RateJump {
+    /// Factors of the velocities in the rate of the gap.
+    pub(crate) row: DVector<f64>,
+    /// Changes of all velocities if the gap's rate changes by 1.
+    pub(crate) kick: DVector<f64>,
+    pub(crate) change: f64,
+    pub(crate) slope: f64,
+}
+
+impl System {
+    /// Returns the number of entries of a point in the model's coordinates.
+    pub(crate) fn state_width(&self) -> usize {
+        self.width() - 2 * (self.n - self.degrees())
+    }
+
+    /// Returns a functional in the model's coordinates.
+    fn in_state(&self, row: &Functional) -> DVector<f64> {
+        let (n, degrees) = (self.n, self.degrees());
+        let mut entries = DVector::zeros(self.state_width());
+        for j in 0..degrees {
+            let sum = |from: usize| (0..n).map(|i| row.0[from + i] * self.to_flow[(i, j)]).sum();
+            (entries[j], entries[degrees + j]) = (sum(0), sum(n));
+        }
+        entries.as_mut_slice()[2 * degrees..].copy_from_slice(&row.0[2 * n..self.width()]);
+        entries
+    }
+
+    /// Returns the rows of the accelerations during a flight.
+    pub(crate) fn accelerations(&self, passage: &Passage) -> DMatrix<f64> {
+        let domain = self.domain(&passage.modes);
+        let mut rows = DMatrix::zeros(self.n, self.state_width());
+        for (i, row) in domain.accelerations.iter().enumerate() {
+            rows.set_row(i, &self.in_state(row).transpose());
+        }
+        &self.from_flow * rows
+    }
+
+    /// Returns the row of the function that is 0 at the end of a flight; none if the end is no event.
+    pub(crate) fn condition(&self, passage: &Passage) -> Option<DVector<f64>> {
+        let End::Event(watch, _) = &passage.end else { return None };
+        let (modes, roots, point) = (&passage.modes, &Roots::default(), &[0.0; WIDTH]);
+        let moment = Moment { frame: self, domain: self.domain(modes), modes, roots, point };
+        Some(self.in_state(&moment.function(*watch)))
+    }
+
+    /// Returns the nth jump of the velocities at the end of a flight, if there is one; of a series, the jump at its start. `v`: the velocities
+    /// before it.
+    pub(crate) fn jump(&self, passage: &Passage, nth: usize, v: &[f64]) -> Option<RateJump> {
+        let impulse = match &passage.end {
+            End::Event(_, impulses) => *impulses.get(nth)?,
+            End::Series(series) if nth == 0 => series.impulse(),
+            _ => return None,
+        };
+        let (Impulse { gap, side, held, bounce }, degrees) = (impulse, self.degrees());
+        let row = &self.machine.gaps[gap].row;
+        let rate: f64 = row.iter().zip(v).map(|(row, v)| row * v).sum();
+        let (wall, point, approach) = (self.last_wall(gap, side), &[0.0; WIDTH], side.sign() * rate);
+        let impact = Impact { system: self, modes: &passage.modes, point, gap, side, wall, approach };
+        let kick = impact.kick(|other| held[other]).map_or(self.kicks[gap], |(kick, _)| kick);
+        let [e, by_speed] = wall.restitution.at(approach.max(0.0));
+        let (factor, by_rate) = match bounce {
+            Bounce::Leaves => (1.0 + e, by_speed),
+            Bounce::Stops => (1.0, 0.0),
+            Bounce::Ends => (1.0 + 2.0 * e / (1.0 - e), 2.0 * by_speed / ((1.0 - e) * (1.0 - e))),
+        };
+        let velocity = |i: usize| (0..self.n).map(|j| self.from_flow[(i, j)] * kick[j]).sum();
+        Some(RateJump {
+            row: row.clone(),
+            kick: DVector::from_fn(degrees, |i, _| velocity(i)),
+            change: -factor * rate,
+            slope: -factor - by_rate * approach,
+        })
+    }
+
+    /// Returns the duration of the rest of a series of impacts, for a point in the model's coordinates where the gap has just left its wall;
+    /// none if the passage is no series.
+    pub(crate) fn rest(&self, passage: &Passage, y: &DVector<f64>) -> Option<f64> {
+        let End::Series(series) = &passage.end else { return None };
+        let (n, degrees, mut point) = (self.n, self.degrees(), [0.0; WIDTH]);
+        for i in 0..n {
+            let along = |from: usize| (0..degrees).map(|j| self.to_flow[(i, j)] * y[from + j]).sum();
+            (point[i], point[n + i]) = (along(0), along(degrees));
+        }
+        point[2 * n..self.width()].copy_from_slice(&y.as_slice()[2 * degrees..]);
+        Some(series.duration(self, &point))
+    }
+
+    /// Returns the time of an end that is no event, in forcing periods.
+    pub(crate) fn known_turns(&self, passage: &Passage) -> f64 {
+        let whole = passage.period as f64;
+        match passage.end {
+            // A stage that begins at phase 0 is entered at the end of the period before.
+            End::Stage(change) => match self.machine.schedule[change].0 {
+                0.0 => whole + 1.0,
+                phase => whole + phase,
+            },
+            End::Half => whole + 0.5,
+            End::Period => whole + 1.0,
+            End::Event(..) | End::Series(_) => passage.turns,
+        }
+    }
+
+    /// Returns the time in which the fastest rate of a flight turns by one radian.
+    pub(crate) fn radian(&self, passage: &Passage) -> f64 {
+        self.domain(&passage.modes).radian()
+    }
+
+    /// Returns the orders of the harmonics in a point.
+    pub(crate) fn orders(&self) -> &[f64] {
+        &self.orders
+    }
+
+    /// Shifts a vector `(x1 .. xn, v1 .. vn)` back along rigid-body modes, as at the end of a forcing period.
+    pub(crate) fn shift_back(&self, passage: &Passage, y: &mut [f64]) {
+        if passage.end == End::Period {
+            for mode in &self.rigid_modes.modes {
+                let by = y[mode.coordinate];
+                y.iter_mut().zip(&mode.direction).for_each(|(y, direction)| *y -= by * direction);
+            }
+        }
+    }
+}

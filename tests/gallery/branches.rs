@@ -1,0 +1,138 @@
+//! Cycles as boundary value problems: derivatives by parameters, and branches with their special points.
+
+use std::f64::consts::TAU;
+use std::sync::atomic::AtomicBool;
+
+use crate::common::built_in;
+use rattlemap::model_file::FileModel;
+use rattlemap_dynamics::cycle::{Branch, BranchEnd, BranchLimits, Itinerary, Solution, Special, follow_on};
+use rattlemap_dynamics::model::{Model, REST};
+use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
+use rattlemap_dynamics::stability::multipliers;
+
+/// Returns a periodic motion from rest with its period, and the model with its time.
+fn cycle(model: &FileModel) -> Option<(Orbit, u32, Box<dyn Model>)> {
+    let orbit = analyse(model, REST, &Settings::default()).unwrap();
+    let Class::Periodic { period } = orbit.class else { return None };
+    let model = (model as &dyn Model).on_cycle(orbit.cycle_time);
+    Some((orbit, period, model))
+}
+
+/// Returns the derivative of a function of the cycle by a parameter from differences of cycles; none if a cycle has other flights, or does
+/// not exist.
+fn slope(
+    (model, itinerary, at): (&dyn Model, &Itinerary, &Solution),
+    parameter: usize,
+    step: f64,
+    of: &dyn Fn(&Solution) -> f64,
+) -> Option<f64> {
+    let value = model.value(parameter);
+    let h = step * value.abs().max(1e-2);
+    let moved = |share: f64| {
+        let mut moved = model.clone_model();
+        moved.set_at(parameter, value + share * h).ok()?;
+        itinerary.solve(&*moved, at).ok().map(|solution| of(&solution))
+    };
+    let pair = |share: f64| Some(moved(share)? - moved(-share)?);
+    Some((45.0 * pair(1.0)? - 9.0 * pair(2.0)? + pair(3.0)?) / (60.0 * h))
+}
+
+/// All models of the gallery that settle on a cycle from rest: pairs and machines, with impacts, series of impacts, elastic contact, meshing,
+/// stages, friction, curves, and without a force.
+#[test]
+fn cycles_and_their_derivatives_agree_with_the_engines_and_with_differences() {
+    let (mut cycles, mut compared) = (0, 0);
+    for model in FileModel::all_built_in() {
+        let name = model.name().to_owned();
+        // Impacts of two gaps alternate there: a series of series.
+        let Some((orbit, period, model)) = cycle(&model).filter(|_| name != "two-loose-gears") else {
+            continue;
+        };
+        let (itinerary, seed) = Itinerary::of(&*model, &orbit.strobe, 2 * period).unwrap();
+        let solution = itinerary.solve(&*model, &seed).unwrap();
+        let sizes: [f64; 2] = [0, 1]
+            .map(|first| orbit.strobe.iter().skip(first).step_by(2).fold(1e-6, |a: f64, b| a.max(b.abs())));
+        for (i, (a, b)) in solution.state().iter().zip(&orbit.strobe).enumerate() {
+            assert!(
+                (a - b).abs() < 1e-11 * sizes[i % 2],
+                "{name}: {:?}, {:?}",
+                solution.state(),
+                orbit.strobe
+            );
+        }
+        assert!(itinerary.is_followed(&*model, &solution), "{name}");
+        assert_eq!(itinerary.word(&*model, &solution).unwrap(), orbit.word, "{name}");
+        let found = multipliers(&itinerary.monodromy(&*model, &solution).unwrap()).unwrap();
+        for [re, im] in orbit.floquet.iter().flatten() {
+            let nearest = found.iter().map(|m| (m[0] - re).hypot(m[1] - im)).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1e-8, "{name}: {re} + {im} i, {found:?}");
+        }
+        cycles += 1;
+        for parameter in 0..model.parameters().len() {
+            let Ok([states, _]) = itinerary.derivatives(&*model, &solution, &[parameter]) else { continue };
+            let n = states.nrows() / 2;
+            let entry =
+                |i: usize| move |at: &Solution| at.state()[if i < n { 2 * i } else { 2 * (i - n) + 1 }];
+            // Long steps have errors of the seventh order, short ones those of rounding.
+            let error = |step: f64| {
+                let expected = |i: usize| slope((&*model, &itinerary, &solution), parameter, step, &entry(i));
+                let expected = (0..2 * n).map(expected).collect::<Option<Vec<f64>>>()?;
+                let size = expected.iter().fold(1e-3, |most: f64, x| most.max(x.abs()));
+                Some((0..2 * n).map(|i| (states[(i, 0)] - expected[i]).abs() / size).fold(0.0, f64::max))
+            };
+            let Some(error) = [1e-3, 1e-4].into_iter().filter_map(error).reduce(f64::min) else { continue };
+            assert!(error < 1e-8, "{name}, {}: {error:e}", model.parameters()[parameter].name);
+            compared += 1;
+        }
+    }
+    assert!(cycles >= 20 && compared >= 90, "{cycles} cycles, {compared} derivatives");
+}
+
+/// Returns the amplitudes of the force at which the cycle with one impact in each period of `coco-impact` has its fold, and at which the motion
+/// without contact grazes the stop, as Dankowicz and Schilder state them.
+fn closed_form(omega: f64) -> [f64; 2] {
+    let (z, e) = (0.05f64, 0.8);
+    let (rate, tau) = ((1.0 - z * z).sqrt(), TAU / omega);
+    let (decay, (sin, cos)) = ((-z * tau).exp(), (rate * tau).sin_cos());
+    let b = (1.0 - decay * cos) / (decay * sin);
+    let [h0, h1] = [-z + rate * b, -z + rate * decay * (b * cos - sin)];
+    let g = (h0 + e * h1) / (omega * (1.0 + e));
+    let grazing = (1.0 - omega * omega).hypot(2.0 * z * omega);
+    [grazing * g.abs() / g.hypot(1.0), grazing]
+}
+
+/// Follows the branch of the cycle with impacts of `coco-impact` over the amplitude of the force.
+fn coco(omega: f64, rises: bool) -> Vec<Branch> {
+    let model = built_in("coco-impact", &[("omega", omega), ("A", 0.9)]);
+    let (orbit, period, model) = cycle(&model).unwrap();
+    let (itinerary, seed) = Itinerary::of(&*model, &orbit.strobe, 2 * period).unwrap();
+    let (halt, amplitude) = (AtomicBool::new(false), model.index("A").unwrap());
+    let limits = BranchLimits::new(&halt);
+    follow_on(&*model, &itinerary, &seed, amplitude, ([0.01, 1.0], rises), &limits).unwrap()
+}
+
+/// From the stable cycle the branch goes down to the fold, back up as an unstable one to the graze, and from there down again as the motion
+/// without contact.
+#[test]
+fn a_branch_turns_at_its_fold_and_at_its_graze() {
+    for omega in [1.05, 1.1, 1.2, 1.3] {
+        let [fold, grazing] = closed_form(omega);
+        let parts = coco(omega, false);
+        let special: Vec<_> =
+            parts.iter().flat_map(|part| &part.special).map(|at| (at.kind, at.at.value)).collect();
+        let [(Special::Fold, at), (Special::Grazing, end)] = special[..] else {
+            panic!("{omega}: {special:?}")
+        };
+        assert!((at - fold).abs() < 1e-12, "omega = {omega}: {at}, {fold}");
+        assert!((end - grazing).abs() < 1e-11, "omega = {omega}: {end}, {grazing}");
+        let [impacts, free] = &parts[..] else { panic!("{} parts", parts.len()) };
+        assert_eq!((impacts.word.to_string(), free.word.to_string()), ("2".to_owned(), String::new()));
+        assert_eq!(free.end, BranchEnd::Range);
+        let before = |point: &&_| rattlemap_dynamics::cycle::BranchPoint::is_stable(point);
+        let stable = impacts.points.iter().take_while(before).count();
+        assert!(impacts.points[stable..].iter().all(|point| !point.is_stable()), "omega = {omega}");
+        assert!((impacts.points[stable - 1].value - fold).abs() < 0.02, "omega = {omega}");
+        assert!(free.points.iter().all(|point| point.is_stable()), "omega = {omega}");
+        assert_eq!(coco(omega, true).last().unwrap().end, BranchEnd::Range);
+    }
+}
