@@ -706,6 +706,12 @@ pub(crate) struct Bifurcation {
     /// Value of the other axis: any value that the parameter allows, also between grid points. Example: --at omega=5.6
     #[arg(long, value_name = "NAME=VALUE", requires = "along", allow_hyphen_values = true)]
     at: Vec<String>,
+
+    /// Follow the branch of every cycle that the diagram finds, through folds, with its unstable parts. Writes branches.csv and
+    /// special_points.csv (folds, flips, grazings, other changes of the sequence of flights), and draws the branches in panels of
+    /// quantities: unstable parts are dashed
+    #[arg(long)]
+    pub(crate) branches: bool,
 }
 
 impl Bifurcation {

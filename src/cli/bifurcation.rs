@@ -13,6 +13,7 @@ use super::progress::Progress;
 use crate::cli::say;
 use crate::findings::hysteresis::{self, Hysteresis};
 use crate::job::scene_file::SceneFile;
+use crate::map::branches::{self, Branches};
 use crate::map::scene::Purpose;
 use crate::map::{bifurcation, plan};
 use crate::store;
@@ -54,22 +55,25 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
             "interrupted after {ended} of {count} columns; nothing was written to {path}"
         )));
     };
+    let name = &scene.axes()[0].parameter().name;
+    let branches =
+        arguments.branches.then(|| branches::branches(&cells, &columns, name, halt)).transpose()?;
     let elapsed = clock.elapsed();
     let files = store::bifurcation::write(
         &folder,
         &scene,
         DiagramArguments { sets: &sets, along },
-        &columns,
+        (&columns, branches.as_ref()),
         elapsed,
     )?;
     let classes = say::classes(plan::count_classes(columns.iter().map(|column| column.class)));
-    let name = &scene.axes()[0].parameter().name;
     let hysteresis = hysteresis::hysteresis(&columns).map(|found| format!("{}\n", described(&found, name)));
     progress.finish(&format!(
         "{count} columns in {:.3} s: {classes}\n\
-         {}{}: {}",
+         {}{}{}: {}",
         elapsed.as_secs_f64(),
         hysteresis.unwrap_or_default(),
+        branches.as_ref().map_or(String::new(), |branches| followed(branches, name)),
         say::path(folder.path()),
         files.join(", ")
     ));
@@ -78,6 +82,17 @@ pub(crate) fn run(arguments: &Bifurcation) -> Result<(), Failure> {
     }
     let all_failed = columns.iter().all(|column| column.class == Class::Failed);
     fail_if(all_failed, "the motion failed in every column; `status` in bifurcation_columns.csv says why")
+}
+
+/// Describes the branches that were followed.
+fn followed(branches: &Branches, name: &str) -> String {
+    let count = branches.rows.last().map_or(0, |row| row.branch);
+    let special = branches.rows.iter().filter(|row| row.special.is_some()).count();
+    let end = |(branch, value, reason): &(usize, f64, String)| {
+        format!("branch {branch} ends at {name} = {}: {reason}\n", significant(*value))
+    };
+    let ends: String = branches.ends.iter().map(end).collect();
+    format!("{count} branches with {special} special points\n{ends}")
 }
 
 /// Describes where the two passes differ.

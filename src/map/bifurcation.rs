@@ -8,7 +8,7 @@ use crate::map::scene::Start;
 use crate::record::measures::{MEASURES, Measured};
 use rattlemap_dynamics::model::{MOST_COORDINATES, Model, ModelError, Oscillator, REST, Side, State};
 use rattlemap_dynamics::named;
-use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Settings, Status};
+use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Quantities, Settings, Status};
 use rattlemap_dynamics::word::Word;
 
 /// The attractor at one value of the axis, with its section points.
@@ -231,6 +231,38 @@ impl Column {
 }
 
 impl Column {
+    /// Builds the column of a cycle on a branch, with its multipliers.
+    pub(crate) fn on_branch(
+        value: f64,
+        (period, forcing_period): (u32, f64),
+        word: Word,
+        state: State,
+        quantities: Option<&Quantities>,
+        multipliers: &[[f64; 2]],
+    ) -> Column {
+        let multiplier = multipliers.first().map(|[re, im]| [re.hypot(*im), im.atan2(*re)]);
+        let impacts =
+            quantities.map_or(f64::NAN, |found| found.approaches[2].count as f64 / f64::from(period));
+        Column {
+            value,
+            direction: None,
+            class: Class::Periodic { period },
+            status: Status::Ok,
+            lyapunov: f64::NAN,
+            lyapunov_error: None,
+            impacts_per_period: impacts,
+            mesh_fraction: f64::NAN,
+            impact_rate: impacts / forcing_period,
+            measures: Measured { quantities, multiplier, cycle_time: None }.numbers(),
+            state: Some(state),
+            symmetric: None,
+            word: Some(word),
+            periods_run: 0,
+            points: Vec::new(),
+            strobes: Vec::new(),
+        }
+    }
+
     fn of(value: f64, orbit: Orbit) -> Column {
         let point = |event: &orbit::Event| SectionPoint {
             gap: event.gap,

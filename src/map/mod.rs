@@ -17,5 +17,6 @@ pub mod engine;
 pub mod sweep;
 
 pub mod bifurcation;
+pub mod branches;
 pub mod catalogue;
 pub mod cycle;

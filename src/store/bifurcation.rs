@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use crate::map::bifurcation::{Column, fixed};
+use crate::map::branches::Branches;
 use crate::map::scene::{Along, Format, Scene};
 use crate::model_file::several_gaps;
 use crate::show::drawing::write_figure;
@@ -11,7 +12,7 @@ use crate::show::figure;
 use crate::show::figure::bifurcation::Panels;
 use crate::show::numbers::Number;
 use crate::show::symbols::{axis_label, symbol};
-use crate::show::table::bifurcation_tables;
+use crate::show::table::{bifurcation_tables, branch_tables};
 use crate::show::{caption, names};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
@@ -24,6 +25,9 @@ const POINTS: &str = "bifurcation.csv";
 const COLUMNS_CSV: &str = "bifurcation_columns.csv";
 /// Strobe states, for models with walls that fix a displacement.
 const STROBE_CSV: &str = "bifurcation_strobe.csv";
+/// Tables of branches.
+const BRANCHES_CSV: &str = "branches.csv";
+const SPECIAL_POINTS_CSV: &str = "special_points.csv";
 /// Names of the figures, by format.
 static FIGURES: LazyLock<Vec<[(Format, String); 3]>> = LazyLock::new(|| {
     let numbered = (2..=MOST_FIGURES).map(|number| names::figures(&format!("bifurcation_{number}")));
@@ -34,7 +38,7 @@ const MOST_FIGURES: usize = 256;
 
 /// Names of all files that a bifurcation diagram may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, POINTS, COLUMNS_CSV, STROBE_CSV]
+    [MANIFEST, POINTS, COLUMNS_CSV, STROBE_CSV, BRANCHES_CSV, SPECIAL_POINTS_CSV]
         .into_iter()
         .chain(FIGURES.iter().flatten().map(|(_, name)| name.as_str()))
 }
@@ -47,7 +51,7 @@ pub fn write(
     folder: &Folder,
     scene: &Scene,
     arguments: DiagramArguments<'_>,
-    columns: &[Column],
+    (columns, branches): (&[Column], Option<&Branches>),
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
@@ -71,6 +75,15 @@ pub fn write(
                 .replace(STROBE_CSV, |out| bifurcation_tables::write_strobes(out, axis, &names, columns))?;
             files.push(STROBE_CSV);
         }
+        if let Some(branches) = branches {
+            folder.replace(BRANCHES_CSV, |out| {
+                branch_tables::write_branches(out, axis, &names, &numbers, branches)
+            })?;
+            folder.replace(SPECIAL_POINTS_CSV, |out| {
+                branch_tables::write_special_points(out, axis, &names, &numbers, branches)
+            })?;
+            files.extend([BRANCHES_CSV, SPECIAL_POINTS_CSV]);
+        }
     }
     let panels = Panels::of(scene.base(), fixed, &numbers);
     for (panels, names) in panels.figures(scene.figure_style(), scene.diagram_style()).iter().zip(&*FIGURES) {
@@ -78,7 +91,8 @@ pub fn write(
         let title = format!("{}{}", scene.title(), line(arguments.along));
         let subtitle = format!("{}; {}", scene.start().in_words(), caption::of_scene(scene));
         let (texts, axis) = ([&*title, &*subtitle], (&*label, scene.axes()[0].scale()));
-        let figure = figure::bifurcation::draw(scene.figure_style(), texts, axis, panels, columns);
+        let figure =
+            figure::bifurcation::draw(scene.figure_style(), texts, axis, panels, (columns, branches));
         for (format, name) in names.iter().filter(|(format, _)| wanted.contains(format)) {
             folder.replace(name, |out| write_figure(out, *format, &figure))?;
             files.push(name);

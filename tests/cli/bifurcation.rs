@@ -55,6 +55,48 @@ fn a_diagram_of_both_directions_reports_where_they_differ() {
     assert!(points.contains(",up,") && points.contains(",down,"));
 }
 
+/// The stable cycle with impacts ends at a fold. From there an unstable branch leads back to the graze of the motion without contact.
+#[test]
+fn branches_have_their_unstable_parts_and_special_points() {
+    let folder = folder();
+    let scene = "model = 'coco-impact'\nparameters = { omega = 1.1 }\naxis = [{ parameter = 'A', min = 0.05, max = 0.9, count = 8 }]\n\
+                 outputs = { quantities = ['amplitude'], files = ['csv', 'svg'] }\n";
+    fs::write(folder.path().join("b.toml"), scene).unwrap();
+    run(&folder, "bifurcation b.toml --branches").success().stderr(says(&[
+        "branches with ",
+        " special points",
+        "special_points.csv",
+    ]));
+    let out = folder.path().join("out/b");
+    let (head, special) = rows(&out.join("special_points.csv"));
+    assert_eq!(head[..6], ["branch", "kind", "arclength", "A", "word", "period"]);
+    let value = |kind: &str| {
+        let found =
+            special.iter().find(|row| row[1] == kind).unwrap_or_else(|| panic!("no {kind}: {special:?}"));
+        found[3].parse::<f64>().unwrap()
+    };
+    // Closed forms: tests/gallery/branches.rs.
+    assert!((value("fold") - 0.116443006937796).abs() < 1e-12, "{special:?}");
+    assert!((value("grazing") - 0.237065391822594).abs() < 1e-10, "{special:?}");
+    let (head, points) = rows(&out.join("branches.csv"));
+    let place = |name: &str| {
+        head.iter().position(|field| field == name).unwrap_or_else(|| panic!("no {name}: {head:?}"))
+    };
+    let [stable, amplitude] = ["stable", "amplitude_x"].map(place);
+    for is_stable in ["true", "false"] {
+        let of: Vec<f64> = points
+            .iter()
+            .filter(|row| row[stable] == is_stable)
+            .map(|row| row[amplitude].parse().unwrap())
+            .collect();
+        assert!(of.len() > 10 && of.iter().all(|x| *x > 0.0), "{is_stable}: {of:?}");
+    }
+    let figure = fs::read_to_string(out.join("bifurcation.svg")).unwrap();
+    assert!(figure.contains("unstable") && figure.contains("stroke-dasharray"), "dashed lines");
+    run(&folder, "bifurcation b.toml --force").success();
+    assert!(!names(&out).contains(&"branches.csv".to_owned()), "{:?}", names(&out));
+}
+
 #[test]
 fn a_map_refuses_both_directions_with_the_remedy() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/e_omega.toml");

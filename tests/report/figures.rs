@@ -25,7 +25,7 @@ fn diagram(format: Format, title: [&str; 2], axis: (&str, Scale), columns: &[Col
     let mut bytes = Vec::new();
     let panels = Panels::of(&GearPair::paper(0.5), None, &[]);
     let style = FigureStyle::default();
-    let figure = bifurcation::draw(&style, title, axis, &panels, columns);
+    let figure = bifurcation::draw(&style, title, axis, &panels, (columns, None));
     write_figure(&mut bytes, format, &figure).unwrap();
     bytes
 }

@@ -218,9 +218,9 @@ impl Canvas {
         self.line(path, width, color, false);
     }
 
-    /// Draws a dashed straight line.
-    pub fn dashes(&self, from: Point, to: Point, width: f64, color: Color) {
-        self.line(&[from, to], width, color, true);
+    /// Draws a dashed polyline.
+    pub fn dashes(&self, path: &[Point], width: f64, color: Color) {
+        self.line(path, width, color, true);
     }
 
     fn line(&self, path: &[Point], width: f64, color: Color, is_dashed: bool) {

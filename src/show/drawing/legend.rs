@@ -150,7 +150,7 @@ pub(crate) fn draw_key(canvas: &Canvas, key: Key, (x, y): Point) {
     let middle = x + KEY / 2.0;
     match key {
         Key::Line { color, width } => canvas.stroke(&[(x, y), (x + KEY, y)], width, color),
-        Key::Dashes { color } => canvas.dashes((x, y), (x + KEY, y), 1.5, color),
+        Key::Dashes { color } => canvas.dashes(&[(x, y), (x + KEY, y)], 1.5, color),
         Key::Marker(marker) => canvas.marker((middle, y), marker),
         Key::MarkerPair(marker) => {
             canvas.marker((middle - 10.0, y), marker);

@@ -6,12 +6,13 @@ mod exponents;
 mod panels;
 
 use crate::map::bifurcation::{Column, Direction};
+use crate::map::branches::{BranchRow, Branches};
 use crate::map::scene::{FigureStyle, Scale};
 use crate::show::color::Color;
 use crate::show::drawing::axis::Axis;
 use crate::show::drawing::frame::{Frame, column, stacked};
 use crate::show::drawing::legend::{Entry, Key, draw_head};
-use crate::show::drawing::{Bitmap, Canvas, FAINT, Marker, Point, Rect, wall_color};
+use crate::show::drawing::{Bitmap, Canvas, DARK, FAINT, Marker, Point, Rect, wall_color};
 use coloring::{Coloring, STROBE, both_directions, class_color, direction_color, mixed};
 pub use panels::Panels;
 use panels::{Panel, States};
@@ -40,6 +41,9 @@ const LONE_DOT: f64 = 2.4;
 const BESIDE: f64 = 6.0;
 /// Widths of the lines of the first and the second pass. Where both agree, the second lies within the first.
 const LINES: [f64; 2] = [4.0, 1.8];
+/// Branches of cycles.
+const BRANCH: Color = DARK;
+const BRANCH_WIDTH: f64 = 1.2;
 const DIRECTIONS: [&str; 2] = ["followed upwards", "downwards"];
 /// A step of a line is a jump to another branch if it has this share of the panel's height, and this multiple of the steps beside it.
 const JUMP: (f64, f64) = (0.15, 4.0);
@@ -56,13 +60,13 @@ pub fn draw(
     [title, subtitle]: [&str; 2],
     axis: (&str, Scale),
     panels: &Panels,
-    columns: &[Column],
+    (columns, branches): (&[Column], Option<&Branches>),
 ) -> Canvas {
     let drawn = Canvas::new(style, WIDTH);
     let canvas = &drawn;
     let marked: Vec<f64> = columns.iter().filter(|c| is_marked(c)).map(|c| c.value).collect();
     let coloring = Coloring::of(columns);
-    let top = draw_head(canvas, title, subtitle, &legend(columns, panels, coloring)) + 14.0;
+    let top = draw_head(canvas, title, subtitle, &legend(columns, panels, coloring, branches)) + 14.0;
     let x = value_axis(axis, columns);
     // Strips of classes need more of a low panel.
     let is_low = !canvas.is_default() && coloring.strips() > 0;
@@ -77,7 +81,7 @@ pub fn draw(
         if panel.states == States::Exponents {
             return (edges, exponents::axis(columns, coloring.strips(), height));
         }
-        let mut y = quantity_axis(panel, columns);
+        let mut y = quantity_axis(panel, columns, branches);
         // Leaves room for the marks below the data.
         y.low -= (y.high - y.low) * MARKS / height;
         (edges, y)
@@ -94,7 +98,10 @@ pub fn draw(
                 frame.draw_axes(canvas, is_last);
                 continue;
             }
-            States::None => draw_branches(canvas, frame, panel, columns, coloring),
+            States::None => {
+                draw_branches(canvas, frame, panel, columns, coloring);
+                branches.into_iter().for_each(|branches| draw_cycles(canvas, frame, panel, branches));
+            }
             _ => draw_points(canvas, frame, panel, columns, coloring),
         }
         let bottom = frame.rect.bottom;
@@ -113,15 +120,22 @@ fn is_marked(column: &Column) -> bool {
 }
 
 /// Returns the vertical axis of a panel.
-fn quantity_axis(panel: &Panel, columns: &[Column]) -> Axis {
-    let values = || columns.iter().flat_map(|column| panel.values(column)).map(|(value, _)| value);
+fn quantity_axis(panel: &Panel, columns: &[Column], branches: Option<&Branches>) -> Axis {
+    let of_branches = || branches.into_iter().flat_map(|branches| &branches.rows).map(|row| &row.column);
+    let all = || columns.iter().chain(of_branches());
+    let values = || all().flat_map(|column| panel.values(column)).map(|(value, _)| value);
     let largest = values().filter(|value| value.is_finite()).fold(0.0, |a: f64, b| a.max(b.abs()));
     // Smaller differences are rounding errors. Any span will do for zeros or without values.
     let least_span = if largest > 0.0 { 1e-6 * largest } else { 1.0 };
     Axis::around(&panel.label, values(), least_span)
 }
 
-fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry> {
+fn legend(
+    columns: &[Column],
+    panels: &Panels,
+    coloring: Coloring,
+    branches: Option<&Branches>,
+) -> Vec<Entry> {
     let dot = |color: Color, text: &str| Entry::new(Key::Marker(Marker::dot(color, 6.0)), text);
     let patch = |color, opacity, text| Entry::new(Key::Patch { color, opacity }, text);
     let has_exponents = panels.has(&[States::Exponents]);
@@ -149,6 +163,10 @@ fn legend(columns: &[Column], panels: &Panels, coloring: Coloring) -> Vec<Entry>
     }
     if has_exponents && columns.iter().any(|column| column.lyapunov_error.is_some()) {
         entries.push(patch(class_color(Class::Chaotic), exponents::ERROR_BAND, "\u{3bb}: standard error"));
+    }
+    if branches.is_some() && panels.has(&[States::None]) {
+        entries.push(Entry::new(Key::Line { color: BRANCH, width: BRANCH_WIDTH }, "branch"));
+        entries.push(Entry::new(Key::Dashes { color: BRANCH }, "unstable"));
     }
     if columns.iter().any(is_marked) && panels.list.iter().any(|panel| panel.states != States::Exponents) {
         entries.push(Entry::new(Key::Mark { color: FAINT }, "undecided or failed"));
@@ -206,6 +224,22 @@ fn draw_branches(canvas: &Canvas, frame: &Frame, panel: &Panel, columns: &[Colum
                 branch => canvas.stroke(branch, width, color),
             }
             start = end;
+        }
+    }
+}
+
+/// Draws the branches of a measured quantity. Unstable parts are dashed.
+fn draw_cycles(canvas: &Canvas, frame: &Frame, panel: &Panel, branches: &Branches) {
+    let place = |row: &BranchRow| {
+        let value = panel.values(&row.column).first().map_or(f64::NAN, |(value, _)| *value);
+        frame.at(row.column.value, value)
+    };
+    // A part ends where the stability changes, or where another branch begins.
+    for part in branches.rows.chunk_by(|a, b| a.branch == b.branch && a.stable == b.stable) {
+        let path: Vec<Point> = part.iter().map(place).collect();
+        match part[0].stable {
+            true => canvas.stroke(&path, BRANCH_WIDTH, BRANCH),
+            false => canvas.dashes(&path, BRANCH_WIDTH, BRANCH),
         }
     }
 }

@@ -257,7 +257,7 @@ fn diagrams_fit_a_page() {
                 let figures = panels.clone().figures(&style, &diagram);
                 assert_eq!(figures.len(), if is_divided { 15 } else { figures.len() });
                 for (nth, panels) in figures.iter().enumerate() {
-                    let canvas = bifurcation::draw(&style, texts, axis, panels, &columns);
+                    let canvas = bifurcation::draw(&style, texts, axis, panels, (&columns, None));
                     check(&format!("{start:?} {nth} {is_divided} {style:?}"), &canvas, false);
                     let (_, height) = canvas.size();
                     assert!(canvas.is_default() || height * millimetres(&canvas) < 290.0, "{height}");

@@ -2,6 +2,7 @@
 
 pub mod attractors_csv;
 pub mod bifurcation_tables;
+pub mod branch_tables;
 pub mod cell_columns;
 pub mod cells_csv;
 pub mod cells_npy;

@@ -142,7 +142,7 @@ impl<'a> OrbitPlot<'a> {
     pub(crate) fn draw_jumps(&self, canvas: &Canvas, frame: &Frame, at: impl Fn(f64, &State) -> Point) {
         for (t, event) in &self.motion.events {
             let [from, to] = [at(*t, &event.before), at(*t, &event.after)].map(|(x, y)| frame.at(x, y));
-            canvas.dashes(from, to, 1.3, FAINT);
+            canvas.dashes(&[from, to], 1.3, FAINT);
         }
     }
 
