@@ -212,7 +212,7 @@ impl Itinerary {
             let step = solve_scaled(&matrix, &-residual, scales).ok_or(CycleError::Diverges)?;
             let length =
                 step.iter().zip(scales).fold(0.0, |most: f64, (x, scale)| most.max((x / scale).abs()));
-            if !(length <= LONGEST) {
+            if length.is_nan() || length > LONGEST {
                 return Err(CycleError::Diverges);
             }
             linearised.change(&mut at, self, &step);

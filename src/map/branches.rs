@@ -54,7 +54,7 @@ pub fn branches(
     let range = [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)];
     let mut all = Branches::default();
     let mut count = 0;
-    if !(range[0] < range[1]) {
+    if cells.len() < 2 {
         return Ok(all);
     }
     for column in columns {

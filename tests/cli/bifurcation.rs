@@ -69,7 +69,7 @@ fn branches_have_their_unstable_parts_and_special_points() {
     ]));
     let out = folder.path().join("out/b");
     let (head, special) = rows(&out.join("special_points.csv"));
-    assert_eq!(head[..6], ["branch", "kind", "arclength", "A", "word", "period"]);
+    assert!(head.starts_with("branch,kind,arclength,A,word,period,stable,x,"), "{head}");
     let value = |kind: &str| {
         let found =
             special.iter().find(|row| row[1] == kind).unwrap_or_else(|| panic!("no {kind}: {special:?}"));
@@ -80,7 +80,7 @@ fn branches_have_their_unstable_parts_and_special_points() {
     assert!((value("grazing") - 0.237065391822594).abs() < 1e-10, "{special:?}");
     let (head, points) = rows(&out.join("branches.csv"));
     let place = |name: &str| {
-        head.iter().position(|field| field == name).unwrap_or_else(|| panic!("no {name}: {head:?}"))
+        head.split(',').position(|field| field == name).unwrap_or_else(|| panic!("no {name}: {head:?}"))
     };
     let [stable, amplitude] = ["stable", "amplitude_x"].map(place);
     for is_stable in ["true", "false"] {

@@ -103,7 +103,7 @@ fn draw(canvas: &Canvas, subtitle: &str, view: View, points: &[Point]) {
     for (style, points) in &present {
         if style.method == MEASURE {
             let x = frame.at(microseconds(points[0]), 1.0).0;
-            canvas.dashes((x, frame.rect.top), (x, frame.rect.bottom), 2.0, style.color);
+            canvas.dashes(&[(x, frame.rect.top), (x, frame.rect.bottom)], 2.0, style.color);
             continue;
         }
         let path: Vec<_> = points.iter().map(|point| place(point)).collect();

@@ -83,7 +83,7 @@ impl Flight<'_> {
     pub(super) fn end(&self, state: &DVector<f64>) -> Option<End> {
         let (size, count, [from, to]) = (state.len(), self.by_parameter.len(), self.turns);
         let steps = ((to - from).abs() / self.radian).ceil().max(1.0);
-        if !(steps <= MOST_STEPS) {
+        if steps.is_nan() || steps > MOST_STEPS {
             return None;
         }
         let h = (to - from) / steps;

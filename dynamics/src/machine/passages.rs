@@ -63,7 +63,7 @@ pub struct Passage {
 }
 
 impl Passage {
-    /// Whether the time of the end is a root of [`System::condition`]. Otherwise the time is known.
+    /// Whether the time of the end is the root of a function. Otherwise the time is known.
     pub fn is_event(&self) -> bool {
         matches!(self.end, End::Event(..))
     }
