@@ -13,7 +13,9 @@ mod equations;
 mod family;
 mod flight;
 
-pub use branch::{Branch, BranchEnd, BranchLimits, BranchPoint, Special, SpecialPoint, follow, follow_on};
+pub use branch::{
+    Branch, BranchEnd, BranchLimits, BranchPoint, Special, SpecialPoint, follow, follow_on, switch,
+};
 pub use family::Free;
 
 use std::f64::consts::TAU;
@@ -22,7 +24,7 @@ use equations::Linearised;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::machine::{MachineMotion, Passage, System};
-use crate::model::{Model, ModelError, State, Timing};
+use crate::model::{Model, ModelError, REST, State, Timing};
 use crate::motion::{GapEvent, Observer, SlipEvent, States, Stop};
 use crate::word::Word;
 
@@ -32,12 +34,16 @@ const MOST_STEPS: usize = 30;
 /// Newton's method ends at steps below this, relative to the scales of the unknowns.
 const CONVERGED: f64 = 1e-13;
 
-/// Largest last step of a search that has converged.
-const ACCEPTED: f64 = 1e-9;
+/// Largest step that may be a rounding error, and the ratio of two steps above which it is one.
+const STAGNANT: f64 = 1e-7;
+const SHRINKS: f64 = 0.9;
 
 /// Largest distance of the motion along a cycle from the solution of its equations, relative to the scales of the unknowns. Near a graze the
 /// motion's times have the square root of rounding errors.
 const NEAR: f64 = 1e-6;
+
+/// Time from phase 0, in turns, within which an event may pass it.
+const BESIDE: f64 = 1e-3;
 
 /// Steps longer than this, relative to the scales of the unknowns, do not lead to a cycle.
 const LONGEST: f64 = 1e3;
@@ -181,6 +187,32 @@ impl Itinerary {
         Some((shorter, seed))
     }
 
+    /// Returns the states after the first event and before the last one if they are so near to phase 0 that they may pass it.
+    fn beside_strobe(&self, system: &System, solution: &Solution) -> Vec<State> {
+        let (passages, length) = (&self.passages, self.passages.last().map_or(0.0, |last| last.turns));
+        let first = passages.first().filter(|passage| passage.is_event() && solution.turns[0] < BESIDE);
+        let after = first.map(|passage| equations::jumped(system, passage, &solution.ends[0]));
+        let last = passages
+            .iter()
+            .rposition(Passage::is_event)
+            .filter(|&last| length - solution.turns[last] < BESIDE);
+        after
+            .into_iter()
+            .chain(last.map(|last| solution.ends[last].clone()))
+            .map(|start| in_pairs(&start))
+            .collect()
+    }
+
+    /// Returns the sequence of flights of two turns around the cycle, and their solution.
+    fn doubled(&self, solution: &Solution) -> (Itinerary, Solution) {
+        let (mut twice, mut both) = (self.clone(), solution.clone());
+        let length = self.passages.last().map_or(0.0, |last| last.turns);
+        twice.passages.extend(self.passages.iter().map(|passage| passage.later(length)));
+        both.ends.extend_from_slice(&solution.ends);
+        both.turns.extend(solution.turns.iter().map(|turns| turns + length));
+        (twice, both)
+    }
+
     /// Returns the number of events.
     pub fn events(&self) -> usize {
         self.passages.iter().filter(|passage| passage.is_event()).count()
@@ -206,6 +238,7 @@ impl Itinerary {
         scales: &[f64],
         extra: &dyn Fn(&Linearised, &Solution) -> Vec<Extra>,
     ) -> Result<(Solution, usize), CycleError> {
+        let mut before = f64::INFINITY;
         for count in 1.. {
             let linearised = self.linearise(&*placed(model, free, &at.values), &at, free)?;
             let (matrix, residual) = linearised.with(&extra(&linearised, &at));
@@ -216,12 +249,15 @@ impl Itinerary {
                 return Err(CycleError::Diverges);
             }
             linearised.change(&mut at, self, &step);
-            if length <= CONVERGED || count == MOST_STEPS && length <= ACCEPTED {
+            // Near singular equations, steps become rounding errors earlier: they do not shrink.
+            let stagnates = length <= STAGNANT && length > SHRINKS * before;
+            if length <= CONVERGED || stagnates {
                 return Ok((at, count));
             }
             if count == MOST_STEPS {
                 break;
             }
+            before = length;
         }
         Err(CycleError::Diverges)
     }
@@ -294,6 +330,13 @@ fn in_blocks(state: &State, n: usize) -> DVector<f64> {
     DVector::from_fn(2 * n, |i, _| if i < n { state[2 * i] } else { state[2 * (i - n) + 1] })
 }
 
+/// Converts a state `(x1 .. xn, v1 .. vn)` to `(x1, v1, ...)`.
+fn in_pairs(blocks: &DVector<f64>) -> State {
+    let (n, mut state) = (blocks.len() / 2, REST);
+    (0..n).for_each(|i| (state[2 * i], state[2 * i + 1]) = (blocks[i], blocks[n + i]));
+    state
+}
+
 /// Returns the free numbers of a model's cycles: the time of a cycle without force.
 fn own(model: &dyn Model) -> Result<Vec<Free>, CycleError> {
     let is_free = model.oscillator()?.timing == Timing::Cycle;
@@ -317,12 +360,7 @@ fn phase(linearised: &Linearised, free: &[Free]) -> Vec<Extra> {
 impl Solution {
     /// Returns the state `(x1, v1, ...)` at phase 0.
     pub fn state(&self) -> State {
-        let n = self.start.len() / 2;
-        let mut state = crate::model::REST;
-        for i in 0..n {
-            (state[2 * i], state[2 * i + 1]) = (self.start[i], self.start[n + i]);
-        }
-        state
+        in_pairs(&self.start)
     }
 
     /// Returns all unknowns: the state at phase 0, the times of events, and the free numbers.
@@ -374,7 +412,7 @@ fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>, scales: &[f64]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{GearPair, REST};
+    use crate::model::GearPair;
     use crate::motion::{Flow, Trajectory};
     use crate::stability::{StrobeMap, refine};
 

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::map::bifurcation::Column;
 use rattlemap_dynamics::cycle::{
-    Branch, BranchEnd, BranchLimits, BranchPoint, CycleError, Itinerary, Special, follow_on,
+    Branch, BranchEnd, BranchLimits, BranchPoint, CycleError, Itinerary, Special, follow_on, switch,
 };
 use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::motion::Flow;
@@ -13,6 +13,10 @@ use rattlemap_dynamics::word::Word;
 
 /// Largest distance of a column's state from a branch that goes through it, relative to the largest state of the branch's part there.
 const ON_BRANCH: f64 = 0.02;
+
+/// Longest cycles, in forcing periods, that are followed from flips, and largest number of branches from one cycle.
+const LONGEST: u32 = 16;
+const MOST_BRANCHES: usize = 64;
 
 /// A cycle on a branch.
 #[derive(Clone, Debug)]
@@ -53,20 +57,48 @@ pub fn branches(
     let values = || cells.iter().map(|cell| cell.0);
     let range = [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)];
     let mut all = Branches::default();
-    let mut count = 0;
     if cells.len() < 2 {
         return Ok(all);
     }
+    let (mut count, limits) = (0, BranchLimits::new(halt));
     for column in columns {
         let (Class::Periodic { period }, Some(state)) = (column.class, column.state) else { continue };
         let Some((_, model)) = cells.iter().find(|cell| cell.0 == column.value) else { continue };
-        if all.pass_through(column, &state) {
+        let parameter = model.index(name)?;
+        if all.pass_through(column.value, period, column.word.as_ref(), &state) {
             continue;
         }
-        let parameter = model.index(name)?;
         let Some(arms) = arms(&**model, &state, (period, parameter), range, halt) else { continue };
-        count += 1;
-        all.add(count, &**model, (parameter, period), &arms)?;
+        // Branches, and those that leave them at flips and pitchforks.
+        let mut found = vec![(period, arms)];
+        while let Some((period, arms)) = found.pop() {
+            count += 1;
+            all.add(count, &**model, (parameter, period), &arms)?;
+            for part in arms.iter().flatten() {
+                for special in &part.special {
+                    let periods = match special.kind {
+                        Special::Flip => 2 * period,
+                        Special::Pitchfork => period,
+                        Special::Fold | Special::Grazing | Special::Border => continue,
+                    };
+                    if periods > LONGEST || count + found.len() >= MOST_BRANCHES {
+                        continue;
+                    }
+                    let leaving =
+                        switch(&**model, part, special, parameter, range, &limits).unwrap_or_default();
+                    let is_new = |arm: &Vec<Branch>| {
+                        let first = &arm[0];
+                        let middle = &first.points[first.points.len() / 2];
+                        !all.pass_through(middle.value, periods, Some(&first.word), &middle.solution.state())
+                    };
+                    let mut arms = leaving.into_iter().filter(is_new);
+                    let arms = [arms.next().unwrap_or_default(), arms.next().unwrap_or_default()];
+                    if !arms[0].is_empty() {
+                        found.push((periods, arms));
+                    }
+                }
+            }
+        }
     }
     Ok(all)
 }
@@ -87,24 +119,21 @@ fn arms(
 }
 
 impl Branches {
-    /// Whether a branch passes through the cycle of a column.
-    fn pass_through(&self, column: &Column, state: &State) -> bool {
+    /// Whether a branch passes through a cycle.
+    fn pass_through(&self, value: f64, period: u32, word: Option<&Word>, state: &State) -> bool {
         self.rows.windows(2).any(|pair| {
             let [a, b] = [&pair[0], &pair[1]];
             let (Some(from), Some(to)) = (a.column.state, b.column.state) else { return false };
             let (low, high) = (a.column.value.min(b.column.value), a.column.value.max(b.column.value));
             if a.branch != b.branch
-                || a.column.word != column.word
-                || a.column.class != column.class
-                || !(low..=high).contains(&column.value)
+                || a.column.word.as_ref() != word
+                || a.column.class != (Class::Periodic { period })
+                || !(low..=high).contains(&value)
             {
                 return false;
             }
-            let share = if high > low {
-                (column.value - a.column.value) / (b.column.value - a.column.value)
-            } else {
-                0.0
-            };
+            let share =
+                if high > low { (value - a.column.value) / (b.column.value - a.column.value) } else { 0.0 };
             let size = |first: usize| {
                 from.iter().chain(&to).skip(first).step_by(2).fold(0.0, |most: f64, x| most.max(x.abs()))
             };

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nalgebra::{DVector, RowDVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::equations::Linearised;
 use super::{CycleError, Free, Itinerary, Solution, own, phase, placed, solve_scaled};
@@ -22,8 +22,9 @@ const BENT: f64 = 0.9;
 const MOST_HALVINGS: usize = 60;
 const LOCATED: f64 = 1e-13;
 
-/// Largest product of distances from -1 at a flip.
+/// Largest product of the distances of multipliers at a flip or a pitchfork, and least product beside it.
 const AT_FLIP: f64 = 1e-6;
+const LEAST_PRODUCT: f64 = 1e-9;
 
 /// Largest number of parts of a branch.
 const MOST_PARTS: usize = 64;
@@ -74,8 +75,10 @@ pub struct BranchPoint {
 pub enum Special {
     /// The branch turns back: a multiplier is 1.
     Fold,
-    /// A multiplier is -1: the period doubles. Of a cycle that is its own mirror image, the symmetry breaks.
+    /// A multiplier is -1: the period doubles.
     Flip,
+    /// A multiplier is 1, and another branch crosses: of cycles that are not their own mirror images, for example.
+    Pitchfork,
     /// An event disappears: its function only touches 0.
     Grazing,
     /// A new event begins, or the sequence of flights changes in another way.
@@ -109,6 +112,8 @@ pub enum BranchEnd {
 /// A part of a branch along which the sequence of flights is the same.
 #[derive(Clone, Debug)]
 pub struct Branch {
+    /// The flights of its cycles.
+    pub itinerary: Itinerary,
     /// The word of its cycles.
     pub word: Word,
     /// The cycles, in order.
@@ -125,6 +130,7 @@ struct Along<'a> {
     itinerary: &'a Itinerary,
     free: Vec<Free>,
     scales: Vec<f64>,
+    range: [f64; 2],
 }
 
 /// Follows the branch of a cycle over a parameter within a range, in one direction: towards larger values at first if `rises`.
@@ -139,97 +145,59 @@ pub fn follow(
     (range, rises): ([f64; 2], bool),
     limits: &BranchLimits<'_>,
 ) -> Result<Branch, CycleError> {
-    let mut free = own(model)?;
-    free.push(Free::Parameter(parameter));
     let mut start = itinerary.solve(model, from)?;
     start.values = start.values.push(model.value(parameter));
-    let mut scales = itinerary.scales(model, &start, &free)?;
-    *scales.last_mut().expect("the parameter is an unknown") = range[1] - range[0];
-    let along = Along { model, itinerary, free, scales };
+    let along = Along::new(model, itinerary, &start, parameter, range)?;
     let mut ahead = DVector::zeros(along.scales.len());
     *ahead.as_mut_slice().last_mut().expect("the parameter is an unknown") = if rises { 1.0 } else { -1.0 };
-    let mut now = along.point(start, &ahead, 0.0)?;
-    let word = itinerary.word(model, &now.0.solution)?;
-    let mut branch =
-        Branch { word, points: vec![now.0.clone()], special: Vec::new(), end: BranchEnd::Points };
-    let [mut length, least, largest] = limits.steps;
-    while branch.points.len() < limits.points {
-        if limits.halt.load(Ordering::Relaxed) {
-            branch.end = BranchEnd::Halted;
-            break;
-        }
-        let next = match along.next(&now, length) {
-            Ok((next, count)) => {
-                let cosine = now.0.tangent.dot(&next.0.tangent);
-                if cosine < BENT && length > least {
-                    length *= 0.5;
-                    continue;
-                }
-                let is_easy = cosine > STRAIGHT && count <= FEW_STEPS;
-                length = (length * if is_easy { 1.5 } else { 1.0 }).min(largest);
-                next
-            }
-            Err(_) if length > least => {
-                length *= 0.5;
-                continue;
-            }
-            Err(error) => {
-                branch.end = BranchEnd::Failed(error);
-                break;
-            }
-        };
-        let passed = next.0.arclength - now.0.arclength;
-        let mut border = None;
-        for event in 0..now.0.approaches.len() {
-            let test = |point: &BranchPoint| point.approaches[event];
-            let found =
-                (test(&now.0) * test(&next.0) < 0.0).then(|| along.locate(&now, passed, &test)).flatten();
-            let is_first = |at: &BranchPoint| {
-                border.as_ref().is_none_or(|(_, first): &(_, BranchPoint)| at.arclength < first.arclength)
-            };
-            if let Some(at) = found.filter(is_first) {
-                border = Some((Special::Grazing, at));
-            }
-        }
-        if border.is_none() && !along.is_admissible(&next.0) {
-            border = Some((Special::Border, along.last_admissible(&now, passed)));
-        }
-        for (kind, test) in [(Special::Fold, fold as fn(&BranchPoint) -> f64), (Special::Flip, flip)] {
-            let found =
-                (test(&now.0) * test(&next.0) < 0.0).then(|| along.locate(&now, passed, &test)).flatten();
-            let is_before =
-                |at: &BranchPoint| border.as_ref().is_none_or(|(_, end)| at.arclength < end.arclength);
-            // A multiplier that passes infinity at a graze changes the sign of the product, too.
-            let is_there = |at: &BranchPoint| {
-                (range[0]..=range[1]).contains(&at.value)
-                    && (kind == Special::Fold || flip(at).abs() < AT_FLIP)
-            };
-            branch
-                .special
-                .extend(found.filter(is_before).filter(is_there).map(|at| SpecialPoint { kind, at }));
-        }
-        let border = border.filter(|(_, at)| (range[0]..=range[1]).contains(&at.value));
-        if let Some((kind, at)) = border {
-            branch.points.push(at.clone());
-            branch.special.push(SpecialPoint { kind, at });
-            branch.end = BranchEnd::Border;
-            break;
-        }
-        if let Some(end) =
-            range.into_iter().zip([-1.0, 1.0]).find(|(end, side)| side * (next.0.value - end) > 0.0)
-        {
-            let at_end = |point: &BranchPoint| point.value - end.0;
-            branch
-                .points
-                .extend((at_end(&now.0) != 0.0).then(|| along.locate(&now, passed, &at_end)).flatten());
-            branch.end = BranchEnd::Range;
-            break;
-        }
-        branch.points.push(next.0.clone());
-        now = next;
+    along.trace(along.point(start, &ahead, 0.0)?, limits)
+}
+
+/// Follows the branch that leaves another one at a flip or at a pitchfork, in both directions: at a flip, one of them, because the other has
+/// the same cycles half a cycle later.
+///
+/// # Errors
+/// [`CycleError`] if the new branch has no cycles.
+pub fn switch(
+    model: &dyn Model,
+    part: &Branch,
+    special: &SpecialPoint,
+    parameter: usize,
+    range: [f64; 2],
+    limits: &BranchLimits<'_>,
+) -> Result<Vec<Vec<Branch>>, CycleError> {
+    let (itinerary, at, is_flip) = (&part.itinerary, &special.at, special.kind == Special::Flip);
+    let before = Along::new(model, itinerary, &at.solution, parameter, range)?;
+    let (_, linearised) = before.point(at.solution.clone(), &at.tangent, 0.0)?;
+    let size = at.solution.start.len();
+    let sign = if is_flip { 1.0 } else { -1.0 };
+    let scale = |i: usize, j: usize| before.scales[j] / before.scales[i];
+    let singular = DMatrix::from_fn(size, size, |i, j| {
+        (linearised.monodromy[(i, j)] + if i == j { sign } else { 0.0 }) * scale(i, j)
+    });
+    let vectors = singular.svd(false, true).v_t.ok_or(CycleError::Diverges)?;
+    let along_start = DVector::from_fn(size, |j, _| vectors[(size - 1, j)] * before.scales[j]);
+    // Of a flip, states and times have the opposite sign in the second half.
+    let (events, mut doubled, mut start) =
+        (linearised.later() * &along_start, itinerary.clone(), at.solution.clone());
+    let mut of_events: Vec<f64> = events.iter().copied().collect();
+    if is_flip {
+        (doubled, start) = itinerary.doubled(&at.solution);
+        of_events.extend(events.iter().map(|x| -x));
     }
-    branch.special.sort_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
-    Ok(branch)
+    let along = Along::new(model, &doubled, &start, parameter, range)?;
+    let mut ahead = DVector::zeros(along.scales.len());
+    let entries = along_start.iter().chain(&of_events);
+    ahead.iter_mut().zip(entries).zip(&along.scales).for_each(|((ahead, x), scale)| *ahead = x / scale);
+    ahead.normalize_mut();
+    let arm = |ahead: DVector<f64>| -> Result<Vec<Branch>, CycleError> {
+        let mut first = along.point(start.clone(), &ahead, 0.0)?;
+        // The equations cannot tell the tangents of the two branches apart.
+        first.0.tangent = ahead;
+        go_on(model, vec![along.trace(first, limits)?], parameter, range, limits)
+    };
+    let other = (!is_flip).then(|| arm(-&ahead)).transpose()?;
+    Ok([arm(ahead)?].into_iter().chain(other).collect())
 }
 
 /// Follows a branch like [`follow`], and on with other sequences of flights where the sequence changes. Returns its parts in order.
@@ -244,23 +212,32 @@ pub fn follow_on(
     direction: ([f64; 2], bool),
     limits: &BranchLimits<'_>,
 ) -> Result<Vec<Branch>, CycleError> {
-    let mut parts = vec![follow(model, itinerary, from, parameter, direction, limits)?];
-    let mut itinerary = itinerary.clone();
+    let first = follow(model, itinerary, from, parameter, direction, limits)?;
+    go_on(model, vec![first], parameter, direction.0, limits)
+}
+
+/// Follows a branch on from the end of its last part, where its sequence of flights changes.
+fn go_on(
+    model: &dyn Model,
+    mut parts: Vec<Branch>,
+    parameter: usize,
+    range: [f64; 2],
+    limits: &BranchLimits<'_>,
+) -> Result<Vec<Branch>, CycleError> {
     while parts.len() < MOST_PARTS
         && let Some(part) = parts.last()
         && let (BranchEnd::Border, Some(at)) = (&part.end, part.points.last())
-        && let Some((next, seed, side)) = successor(model, &itinerary, at, parameter, direction.0)
+        && let Some((next, seed, side)) = successor(model, &part.itinerary, at, parameter, range)
     {
         let mut moved = model.clone_model();
         moved.assign(parameter, at.value + side);
-        let (range, away) = (direction.0, side > 0.0);
+        let away = side > 0.0;
         // Events that begin at a graze become faster, whether the parameter rises or falls.
-        let rises = match next.events() > itinerary.events() {
+        let rises = match next.events() > part.itinerary.events() {
             true => steepens(&*moved, &next, &seed, parameter, (range, limits)).unwrap_or(away),
             false => away,
         };
         parts.push(follow(&*moved, &next, &seed, parameter, (range, rises), limits)?);
-        itinerary = next;
     }
     Ok(parts)
 }
@@ -301,11 +278,14 @@ fn successor(
         let mut moved = placed(model, &free, &seed.values);
         moved.assign(parameter, at.value + difference);
         let Ok(oscillator) = moved.oscillator() else { continue };
-        let half_periods = itinerary.half_periods(&System::new(&oscillator));
-        let run = Itinerary::of(&*moved, &seed.state(), half_periods).ok();
+        let system = System::new(&oscillator);
+        let half_periods = itinerary.half_periods(&system);
+        // An event may pass phase 0.
+        let starts = [seed.state()].into_iter().chain(itinerary.beside_strobe(&system, &seed));
+        let run = starts.filter_map(|state| Itinerary::of(&*moved, &state, half_periods).ok());
         let grazing = at.approaches.iter().enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let shorter = grazing.and_then(|(nth, _)| itinerary.without(nth, &seed));
-        for (next, start) in run.into_iter().chain(shorter) {
+        for (next, start) in run.chain(shorter) {
             if !next.is_like(itinerary)
                 && let Ok(solution) = next.solve(&*moved, &start)
                 && next.is_followed(&*placed(&*moved, &free, &solution.values), &solution)
@@ -317,9 +297,19 @@ fn successor(
     None
 }
 
+/// A function that changes its sign at a special point.
+type Test = fn(&BranchPoint) -> f64;
+
 /// Returns the component of the tangent along the parameter, which is 0 at a fold.
 fn fold(point: &BranchPoint) -> f64 {
     point.tangent[point.tangent.len() - 1]
+}
+
+/// Returns a function that is 0 where another branch crosses: the product of the distances of all multipliers from 1, divided by the component
+/// of the tangent along the parameter, which is 0 at a fold, too.
+fn pitchfork(point: &BranchPoint) -> f64 {
+    let of = |[re, im]: &[f64; 2]| if *im == 0.0 { re - 1.0 } else { (re - 1.0).hypot(*im) };
+    point.multipliers.iter().map(of).product::<f64>() / fold(point)
 }
 
 /// Returns the product of the distances of all multipliers from -1.
@@ -335,7 +325,124 @@ impl BranchPoint {
     }
 }
 
-impl Along<'_> {
+impl<'a> Along<'a> {
+    /// `start`: a solution with the value of the parameter as its last free number.
+    fn new(
+        model: &'a dyn Model,
+        itinerary: &'a Itinerary,
+        start: &Solution,
+        parameter: usize,
+        range: [f64; 2],
+    ) -> Result<Along<'a>, CycleError> {
+        let mut free = own(model)?;
+        free.push(Free::Parameter(parameter));
+        let mut scales = itinerary.scales(model, start, &free)?;
+        *scales.last_mut().expect("the parameter is an unknown") = range[1] - range[0];
+        Ok(Along { model, itinerary, free, scales, range })
+    }
+
+    /// Follows a branch from a point.
+    fn trace(
+        &self,
+        mut now: (BranchPoint, Linearised),
+        limits: &BranchLimits<'_>,
+    ) -> Result<Branch, CycleError> {
+        let (itinerary, word) =
+            (self.itinerary.clone(), self.itinerary.word(self.model_at(&now.0).as_ref(), &now.0.solution)?);
+        let (points, special) = (vec![now.0.clone()], Vec::new());
+        let mut branch = Branch { itinerary, word, points, special, end: BranchEnd::Points };
+        let [mut length, least, largest] = limits.steps;
+        while branch.points.len() < limits.points {
+            if limits.halt.load(Ordering::Relaxed) {
+                branch.end = BranchEnd::Halted;
+                break;
+            }
+            let cosine = |next: &BranchPoint| now.0.tangent.dot(&next.tangent);
+            let next = match self.next(&now, length) {
+                Ok((next, count)) if cosine(&next.0) >= BENT || length <= least => {
+                    let is_easy = cosine(&next.0) > STRAIGHT && count <= FEW_STEPS;
+                    length = if is_easy { largest.min(1.5 * length) } else { length };
+                    next
+                }
+                Err(error) if length <= least => {
+                    branch.end = BranchEnd::Failed(error);
+                    break;
+                }
+                _ => {
+                    length *= 0.5;
+                    continue;
+                }
+            };
+            let border = self.border(&now, &next.0);
+            branch.special.extend(self.special(&now, &next.0, border.as_ref().map(|(_, at)| at.arclength)));
+            if let Some((kind, at)) = border {
+                branch.points.push(at.clone());
+                branch.special.push(SpecialPoint { kind, at });
+                branch.end = BranchEnd::Border;
+                break;
+            }
+            if let Some(end) = self.end_of_range(&next.0) {
+                let at_end = |point: &BranchPoint| point.value - end;
+                branch.points.extend(self.locate(&now, &next.0, &at_end));
+                branch.end = BranchEnd::Range;
+                break;
+            }
+            branch.points.push(next.0.clone());
+            now = next;
+        }
+        Ok(branch)
+    }
+
+    /// Returns the end of the parameter's range beyond which a point lies.
+    fn end_of_range(&self, point: &BranchPoint) -> Option<f64> {
+        let [low, high] = self.range;
+        if point.value < low { Some(low) } else { (point.value > high).then_some(high) }
+    }
+
+    /// Returns where the sequence of flights changes between two points.
+    fn border(&self, now: &(BranchPoint, Linearised), next: &BranchPoint) -> Option<(Special, BranchPoint)> {
+        let grazing = (0..next.approaches.len())
+            .filter_map(|event| self.locate(now, next, &|point| point.approaches[event]))
+            .min_by(|a, b| a.arclength.total_cmp(&b.arclength))
+            .map(|at| (Special::Grazing, at));
+        let border =
+            || (!self.is_admissible(next)).then(|| (Special::Border, self.last_admissible(now, next)));
+        grazing.or_else(border).filter(|(_, at)| self.end_of_range(at).is_none())
+    }
+
+    /// Returns folds, flips and pitchforks between two points, up to a given arclength.
+    fn special(
+        &self,
+        now: &(BranchPoint, Linearised),
+        next: &BranchPoint,
+        end: Option<f64>,
+    ) -> Vec<SpecialPoint> {
+        let tests: [(Special, Test, f64); 3] = [
+            (Special::Fold, fold, f64::INFINITY),
+            // A multiplier that passes infinity at a graze changes the sign of the products, too.
+            (Special::Flip, flip, AT_FLIP),
+            (Special::Pitchfork, pitchfork, AT_FLIP),
+        ];
+        let mut found = Vec::new();
+        for (kind, test, most) in tests {
+            // Products that are rounding errors belong to families of cycles.
+            let is_clear = kind == Special::Fold || test(&now.0).abs().min(test(next).abs()) > LEAST_PRODUCT;
+            let at = is_clear.then(|| self.locate(now, next, &test)).flatten();
+            let is_there = |at: &BranchPoint| {
+                self.end_of_range(at).is_none()
+                    && test(at).abs() <= most
+                    && end.is_none_or(|end| at.arclength < end)
+            };
+            found.extend(at.filter(is_there).map(|at| SpecialPoint { kind, at }));
+        }
+        found.sort_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
+        found
+    }
+
+    fn model_at(&self, point: &BranchPoint) -> Box<dyn Model> {
+        placed(self.model, &self.free, &point.solution.values)
+    }
+
     /// Completes a solution to a point whose tangent continues an earlier one.
     fn point(
         &self,
@@ -385,23 +492,25 @@ impl Along<'_> {
 
     /// Whether the motion along the cycle has the cycle's sequence of flights.
     fn is_admissible(&self, point: &BranchPoint) -> bool {
-        let model = placed(self.model, &self.free, &point.solution.values);
-        self.itinerary.is_followed(&*model, &point.solution)
+        self.itinerary.is_followed(&*self.model_at(point), &point.solution)
     }
 
-    /// Returns the point between two distances along the tangent where a test function is 0, by bisection and false position.
+    /// Returns the point between two points where a test function is 0, by false position and bisection; none if it has the same sign at both.
     fn locate(
         &self,
         from: &(BranchPoint, Linearised),
-        length: f64,
+        to: &BranchPoint,
         test: &dyn Fn(&BranchPoint) -> f64,
     ) -> Option<BranchPoint> {
-        let (mut low, mut high) = ((0.0, test(&from.0)), (length, test(&self.next(from, length).ok()?.0.0)));
+        let length = to.arclength - from.0.arclength;
+        let (mut low, mut high) = ((0.0, test(&from.0)), (length, test(to)));
         let mut found = None;
-        for nth in 0..MOST_HALVINGS {
+        let opposite = low.1 * high.1 < 0.0;
+        for nth in (0..MOST_HALVINGS).take_while(|_| opposite) {
             let share = if nth % 3 == 2 { 0.5 } else { low.1 / (low.1 - high.1) };
             let middle = low.0 + share.clamp(1e-3, 1.0 - 1e-3) * (high.0 - low.0);
-            let point = self.next(from, middle).ok()?.0.0;
+            // At a pitchfork the equations are singular.
+            let Ok(((point, _), _)) = self.next(from, middle) else { break };
             let value = test(&point);
             if value * low.1 > 0.0 {
                 low = (middle, value)
@@ -416,9 +525,9 @@ impl Along<'_> {
         found
     }
 
-    /// Returns the last point before a distance at which the cycle is admissible, by bisection.
-    fn last_admissible(&self, from: &(BranchPoint, Linearised), length: f64) -> BranchPoint {
-        let (mut low, mut high, mut found) = (0.0, length, from.0.clone());
+    /// Returns the last point at which the cycle is admissible between two points, by bisection.
+    fn last_admissible(&self, from: &(BranchPoint, Linearised), to: &BranchPoint) -> BranchPoint {
+        let (mut low, mut high, mut found) = (0.0, to.arclength - from.0.arclength, from.0.clone());
         for _ in 0..MOST_HALVINGS {
             let middle = 0.5 * (low + high);
             match self.next(from, middle) {

@@ -27,8 +27,9 @@ pub(super) struct Linearised {
     /// Derivatives of the states before each end by all unknowns, and the changes of these states that make all flights fit.
     ends: Vec<DMatrix<f64>>,
     misfits: Vec<DVector<f64>>,
-    /// Derivatives of the times of all ends.
+    /// Derivatives of the times of all ends by all unknowns, and of events by the state at phase 0 where they follow it.
     turns: DMatrix<f64>,
+    later: DMatrix<f64>,
     /// Times of all ends that are no events.
     known: Vec<f64>,
 }
@@ -66,7 +67,7 @@ impl Carried {
 }
 
 /// Returns the state after the jumps of a passage.
-fn jumped(system: &System, passage: &Passage, before: &DVector<f64>) -> DVector<f64> {
+pub(super) fn jumped(system: &System, passage: &Passage, before: &DVector<f64>) -> DVector<f64> {
     let (n, mut state) = (before.len() / 2, before.clone());
     for nth in 0.. {
         let Some(jump) = system.jump(passage, nth, &state.as_slice()[n..]) else { break };
@@ -100,6 +101,7 @@ impl Itinerary {
             ends: Vec::new(),
             misfits: Vec::new(),
             turns: DMatrix::zeros(self.passages.len(), count),
+            later: DMatrix::zeros(events, size),
             known: Vec::new(),
         };
         let (mut turns, mut turns_by, mut equation) = (0.0, RowDVector::zeros(count + size), size);
@@ -151,6 +153,7 @@ impl Itinerary {
                 let rate = row_of_state.dot(&end.rates[1]) + drift(system.orders(), row, &point);
                 linearised.approaches.push(rate);
                 let later = row_of_state.transpose() * now.by.columns(count, size) / -rate;
+                linearised.later.set_row(equation - size, &later);
                 end_by.columns_mut(count, size).copy_from(&later);
             }
             now.by += &end.rates[1] * &end_by;
@@ -242,6 +245,11 @@ impl Linearised {
         }
         let free = at.values.len();
         at.values += step.rows(step.len() - free, free);
+    }
+
+    /// Returns the derivatives of the times of events by the state at phase 0.
+    pub(super) fn later(&self) -> &DMatrix<f64> {
+        &self.later
     }
 
     /// Returns the derivatives of the times of all ends by all unknowns.

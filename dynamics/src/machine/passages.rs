@@ -73,6 +73,11 @@ impl Passage {
         matches!(self.end, End::Series(_))
     }
 
+    /// Returns the same passage a whole number of forcing periods later.
+    pub(crate) fn later(&self, periods: f64) -> Passage {
+        Passage { period: self.period + periods as u64, turns: self.turns + periods, ..self.clone() }
+    }
+
     /// Whether another flight has the same modes.
     pub(crate) fn has_modes_of(&self, other: &Passage) -> bool {
         self.modes == other.modes

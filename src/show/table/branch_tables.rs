@@ -14,6 +14,7 @@ fn name(kind: Special) -> &'static str {
     match kind {
         Special::Fold => "fold",
         Special::Flip => "flip",
+        Special::Pitchfork => "pitchfork",
         Special::Grazing => "grazing",
         Special::Border => "border",
     }
