@@ -5,7 +5,9 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::built_in;
 use rattlemap::model_file::FileModel;
-use rattlemap_dynamics::cycle::{Branch, BranchEnd, BranchLimits, Itinerary, Solution, Special, follow_on};
+use rattlemap_dynamics::cycle::{
+    Branch, BranchEnd, BranchLimits, Itinerary, Solution, Special, follow_on, switch,
+};
 use rattlemap_dynamics::model::{Model, REST};
 use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
 use rattlemap_dynamics::stability::multipliers;
@@ -134,5 +136,31 @@ fn a_branch_turns_at_its_fold_and_at_its_graze() {
         assert!((impacts.points[stable - 1].value - fold).abs() < 0.02, "omega = {omega}");
         assert!(free.points.iter().all(|point| point.is_stable()), "omega = {omega}");
         assert_eq!(coco(omega, true).last().unwrap().end, BranchEnd::Range);
+    }
+}
+
+/// At omega = 5.6 of the paper the symmetric cycle loses its symmetry at e = 0.541908. Both cycles without it, mirror images of each other, reach
+/// a further contact at e = 0.60521. The phase of the impacts of one of them passes 0 on the way.
+#[test]
+fn the_cycles_that_leave_a_pitchfork_are_followed_to_their_graze() {
+    let model = built_in("gear-pair", &[("omega", 5.6), ("e", 0.53)]);
+    let (orbit, period, model) = cycle(&model).unwrap();
+    let (itinerary, seed) = Itinerary::of(&*model, &orbit.strobe, 2 * period).unwrap();
+    let (halt, e, range) = (AtomicBool::new(false), model.index("e").unwrap(), [0.5, 0.62]);
+    let limits = BranchLimits::new(&halt);
+    let parts = follow_on(&*model, &itinerary, &seed, e, (range, true), &limits).unwrap();
+    let [part] = &parts[..] else { panic!("{} parts", parts.len()) };
+    let [pitchfork] = &part.special[..] else { panic!("{:?}", part.special) };
+    assert_eq!(pitchfork.kind, Special::Pitchfork);
+    assert!((pitchfork.at.value - 0.541908).abs() < 1e-6, "{}", pitchfork.at.value);
+    assert!(!part.points.last().unwrap().is_stable());
+    let arms = switch(&*model, part, pitchfork, e, range, &limits).unwrap();
+    assert_eq!(arms.len(), 2);
+    for arm in arms {
+        assert!(arm[0].points[1..].iter().all(|point| point.is_stable()));
+        let special: Vec<_> =
+            arm.iter().flat_map(|part| &part.special).map(|at| (at.kind, at.at.value)).collect();
+        let (kind, at) = special[0];
+        assert!(kind == Special::Border && (at - 0.60521).abs() < 5e-6, "{special:?}");
     }
 }

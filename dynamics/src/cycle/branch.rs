@@ -237,7 +237,12 @@ fn go_on(
             true => steepens(&*moved, &next, &seed, parameter, (range, limits)).unwrap_or(away),
             false => away,
         };
-        parts.push(follow(&*moved, &next, &seed, parameter, (range, rises), limits)?);
+        let beyond = follow(&*moved, &next, &seed, parameter, (range, rises), limits)?;
+        // An event that passes phase 0 changes no word.
+        if let Some(part) = parts.last_mut().filter(|part| part.word == beyond.word) {
+            part.special.pop_if(|last| last.kind == Special::Border);
+        }
+        parts.push(beyond);
     }
     Ok(parts)
 }
