@@ -22,6 +22,9 @@ const BENT: f64 = 0.9;
 const MOST_HALVINGS: usize = 60;
 const LOCATED: f64 = 1e-13;
 
+/// Largest number of points in a row at which a search finds no cycle.
+const MOST_FAILURES: u32 = 4;
+
 /// Largest product of the distances of multipliers at a flip or a pitchfork, and least product beside it.
 const AT_FLIP: f64 = 1e-6;
 const LEAST_PRODUCT: f64 = 1e-9;
@@ -194,7 +197,10 @@ pub fn switch(
         let mut first = along.point(start.clone(), &ahead, 0.0)?;
         // The equations cannot tell the tangents of the two branches apart.
         first.0.tangent = ahead;
-        go_on(model, vec![along.trace(first, limits)?], parameter, range, limits)
+        let mut first = along.trace(first, limits)?;
+        // The branch begins at the special point.
+        first.special.retain(|special| special.at.arclength > limits.steps[0]);
+        go_on(model, vec![first], parameter, range, limits)
     };
     let other = (!is_flip).then(|| arm(-&ahead)).transpose()?;
     Ok([arm(ahead)?].into_iter().chain(other).collect())
@@ -510,19 +516,29 @@ impl<'a> Along<'a> {
         let length = to.arclength - from.0.arclength;
         let (mut low, mut high) = ((0.0, test(&from.0)), (length, test(to)));
         let mut found = None;
-        let opposite = low.1 * high.1 < 0.0;
+        let (opposite, mut failures) = (low.1 * high.1 < 0.0, 0);
         for nth in (0..MOST_HALVINGS).take_while(|_| opposite) {
-            let share = if nth % 3 == 2 { 0.5 } else { low.1 / (low.1 - high.1) };
+            // At a pitchfork the equations are singular: there the search goes on from other points.
+            let share = match failures {
+                0 if nth % 3 == 2 => 0.5,
+                0 => low.1 / (low.1 - high.1),
+                _ => 0.5 + 0.1 * f64::from(failures),
+            };
             let middle = low.0 + share.clamp(1e-3, 1.0 - 1e-3) * (high.0 - low.0);
-            // At a pitchfork the equations are singular.
-            let Ok(((point, _), _)) = self.next(from, middle) else { break };
+            let Ok(((point, _), _)) = self.next(from, middle) else {
+                failures += 1;
+                if failures > MOST_FAILURES {
+                    break;
+                }
+                continue;
+            };
             let value = test(&point);
             if value * low.1 > 0.0 {
                 low = (middle, value)
             } else {
                 high = (middle, value)
             }
-            found = Some(point);
+            (found, failures) = (Some(point), 0);
             if value == 0.0 || high.0 - low.0 <= LOCATED {
                 break;
             }
