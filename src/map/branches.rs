@@ -184,7 +184,7 @@ impl Branches {
             }
             if let Some((part, point)) = arm.last().and_then(|part| Some((part, part.points.last()?))) {
                 let reason = match &part.end {
-                    BranchEnd::Range => None,
+                    BranchEnd::Range | BranchEnd::Closed => None,
                     BranchEnd::Border => {
                         Some("no cycle goes on where its sequence of flights changes".to_owned())
                     }

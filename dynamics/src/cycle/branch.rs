@@ -29,6 +29,12 @@ const MOST_FAILURES: u32 = 4;
 const AT_FLIP: f64 = 1e-6;
 const LEAST_PRODUCT: f64 = 1e-9;
 
+/// Largest distance of a part's start from that of an equal part, relative to the size of states and to the parameter's range.
+const BESIDE_START: f64 = 1e-6;
+
+/// Least number of points of a branch that comes back to where it began.
+const LEAST_LOOP: usize = 10;
+
 /// Largest number of parts of a branch.
 const MOST_PARTS: usize = 64;
 
@@ -106,6 +112,8 @@ pub enum BranchEnd {
     Border,
     /// Newton's method fails even for the shortest step.
     Failed(CycleError),
+    /// The branch comes back to where it began.
+    Closed,
     /// The number of points is at its limit.
     Points,
     /// The computation was halted.
@@ -235,6 +243,17 @@ fn go_on(
         && let (BranchEnd::Border, Some(at)) = (&part.end, part.points.last())
         && let Some((next, seed, side)) = successor(model, &part.itinerary, at, parameter, range)
     {
+        let is_known = |part: &Branch| {
+            let first = &part.points[0];
+            let apart = (&first.solution.start - &seed.start).amax();
+            part.itinerary.is_like(&next)
+                && (first.value - at.value - side).abs() <= BESIDE_START * (range[1] - range[0])
+                && apart <= BESIDE_START * seed.start.amax()
+        };
+        if parts.iter().any(is_known) {
+            parts.last_mut().expect("there is a part").end = BranchEnd::Closed;
+            break;
+        }
         let mut moved = model.clone_model();
         moved.assign(parameter, at.value + side);
         let away = side > 0.0;
@@ -399,9 +418,19 @@ impl<'a> Along<'a> {
                 break;
             }
             branch.points.push(next.0.clone());
+            if branch.points.len() > LEAST_LOOP && self.distance(&next.0, &branch.points[0]) < length {
+                branch.end = BranchEnd::Closed;
+                break;
+            }
             now = next;
         }
         Ok(branch)
+    }
+
+    /// Returns the distance of two cycles in scaled unknowns.
+    fn distance(&self, a: &BranchPoint, b: &BranchPoint) -> f64 {
+        let apart = a.solution.unknowns(self.itinerary) - b.solution.unknowns(self.itinerary);
+        apart.iter().zip(&self.scales).map(|(x, scale)| (x / scale).powi(2)).sum::<f64>().sqrt()
     }
 
     /// Returns the end of the parameter's range beyond which a point lies.
