@@ -69,7 +69,7 @@ pub struct BranchPoint {
     pub solution: Solution,
     /// Value of the parameter.
     pub value: f64,
-    /// Floquet multipliers `[re, im]` of the map over the itinerary, largest modulus first.
+    /// Floquet multipliers `[re, im]` of the map over the itinerary, largest modulus first, without that of a shift in time.
     pub multipliers: Vec<[f64; 2]>,
     /// Length of the branch from its start.
     pub arclength: f64,
@@ -501,7 +501,13 @@ impl<'a> Along<'a> {
         right[count - 1] = 1.0;
         let step = solve_scaled(&matrix, &right, &self.scales).ok_or(CycleError::Diverges)?;
         let tangent = DVector::from_fn(count, |j, _| step[j] / self.scales[j]).normalize();
-        let multipliers = multipliers(&linearised.monodromy).ok_or(CycleError::Diverges)?;
+        let mut multipliers = multipliers(&linearised.monodromy).ok_or(CycleError::Diverges)?;
+        if self.free.contains(&Free::CycleTime) {
+            // The choice of phase 0 on a cycle without force has the multiplier 1.
+            let off = |[re, im]: &[f64; 2]| (re - 1.0).hypot(*im);
+            let nearest = multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+            nearest.map(|(place, _)| place).map(|place| multipliers.remove(place));
+        }
         let value = solution.values[solution.values.len() - 1];
         let approaches = linearised.approaches.clone();
         Ok((BranchPoint { solution, value, multipliers, arclength, tangent, approaches }, linearised))
