@@ -15,7 +15,7 @@ fn begin(@builtin(global_invocation_id) id: vec3<u32>) {
     // The trail needs no initial value, because `strobe_count` says that it is empty.
     motions[lane].now = motion;
     motions[lane].measures = measures;
-    motions[lane].tangents = Matrix();
+    clear_columns();
     motions[lane].vector = initial_tangent();
     tallies[lane].now = tally;
     tallies[lane].search = search;

@@ -87,7 +87,10 @@ const LEAST_SQUARINGS: u32 = 3u;
 // gap below them, `|M^n|^(1/n)` with `n = 2^SQUARINGS` is the radius up to a factor of `kappa^(1/n)`, where kappa is the condition of the
 // eigenvectors.
 fn spectral_growth() -> Real {
-    var m = motions[lane].tangents;
+    var m: Matrix;
+    for (var k = 0u; k < MATRIX; k++) {
+        m[k] = motions[lane].tangents[k];
+    }
     let whole = largest_entry(m);
     if tallies[lane].has_overflowed == 1u || !(whole < OUT_OF_RANGE) {
         // The matrix is too large, or contains NaN.

@@ -11,25 +11,6 @@ fn tangent(i: u32) -> State {
     return column(i);
 }
 
-fn set_tangent(i: u32, u: State) {
-    if GROWTH {
-        tangent_now = u;
-        return;
-    }
-    //% for k in 0..DIM
-    motions[lane].tangents[DIM * i + $ku] = u[$ku];
-    //% end
-}
-
-// Returns a column of the monodromy matrix.
-fn column(i: u32) -> State {
-    var u: State;
-    //% for k in 0..DIM
-    u[$ku] = motions[lane].tangents[DIM * i + $ku];
-    //% end
-    return u;
-}
-
 // Loads the tangent vector at the start of a dispatch.
 fn load_tangent() {
     if GROWTH {
@@ -59,16 +40,7 @@ fn carry_vector() {
     if search.newton_steps > 0u {
         return;
     }
-    let u = motions[lane].vector;
-    let m = motions[lane].tangents;
-    var image: State;
-    for (var i = 0u; i < DIM; i++) {
-        var sum = m[i] * u[0u] + m[i + DIM] * u[1u];
-        //% for k in 1..COORDINATES
-        sum += m[i + 2u * $ku * DIM] * u[2u * $ku] + m[i + (2u * $ku + 1u) * DIM] * u[2u * $ku + 1u];
-        //% end
-        image[i] = sum;
-    }
+    var image = image_of(motions[lane].vector);
     let size = largest(image);
     if !(size > 1e-30 && size < 1e30) {
         motions[lane].vector = initial_tangent();
@@ -99,9 +71,16 @@ fn scaled(u: State, factor: Real) -> State {
     return v;
 }
 
+// Sets the columns to zero. A matrix that is stored as a whole is slow to compile: some drivers write a loop over lanes for each entry.
+fn clear_columns() {
+    for (var k = 0u; k < MATRIX; k++) {
+        motions[lane].tangents[k] = 0.0;
+    }
+}
+
 // Starts to carry the columns of the monodromy matrix. With one displacement, x is always 0 and has no tangent.
 fn begin_columns() {
-    motions[lane].tangents = Matrix();
+    clear_columns();
     for (var i = 0u; i < 2u * shapes[cell.flow_index].degrees; i++) {
         motions[lane].tangents[(DIM + 1u) * i] = 1.0;
     }
@@ -123,20 +102,21 @@ fn check_columns() {
         begin_columns();
         return;
     }
+    var stretch = motions[lane].stretch;
     if tallies[lane].is_superstable + tallies[lane].column_scalings == 0u {
-        motions[lane].stretch[2] = max(motions[lane].stretch[2], size);
+        stretch[2] = max(stretch[2], size);
     }
-    let smallest = min(motions[lane].stretch[0], size);
-    motions[lane].stretch[0] = smallest;
-    motions[lane].stretch[1] = max(motions[lane].stretch[1], size / smallest);
+    stretch[0] = min(stretch[0], size);
+    stretch[1] = max(stretch[1], size / stretch[0]);
     if size * LARGE < 1.0 {
         iterations += MATRIX;
         for (var k = 0u; k < MATRIX; k++) {
             motions[lane].tangents[k] *= LARGE;
         }
-        motions[lane].stretch[0] *= LARGE;
+        stretch[0] *= LARGE;
         tallies[lane].column_scalings += 1u;
     }
+    motions[lane].stretch = stretch;
 }
 
 // Size above which a tangent vector counts as lost, because its next step may leave the range of single precision.

@@ -195,7 +195,11 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
         result.highs = motions[slot].highs;
         result.lows = motions[slot].lows;
     }
-    result.tangents = motions[slot].tangents;
-    result.has_read = Real(tallies[slot].search.has_read);
-    measured[i] = result;
+    measured[i].totals = result.totals;
+    measured[i].highs = result.highs;
+    measured[i].lows = result.lows;
+    measured[i].has_read = Real(tallies[slot].search.has_read);
+    for (var k = 0u; k < MATRIX; k++) {
+        measured[i].tangents[k] = motions[slot].tangents[k];
+    }
 }

@@ -41,7 +41,7 @@ fn reversed(slip: u32) -> u32 {
 
 // Stops the gap, and returns the duration of the rest. Returns 0 and changes nothing if the series is not endless, or if its rest is too
 // long.
-fn begin_rest(domain: u32) -> Real {
+fn begin_rest(domain: u32, to_stop: Real) -> Real {
     let gap = leaving_gap;
     let sign = sign_of(leaving_side);
     let law = laws[cell.law_index][2u * gap + leaving_side];
@@ -148,7 +148,7 @@ fn begin_rest(domain: u32) -> Real {
     rest.per_speed = (times[1] - times[2]) / (2.0 * DIFFERENCE * speed);
     rest.per_pressing = (times[3] - times[4]) / (2.0 * DIFFERENCE * inward);
     // The rest ends before the next stop. Rounding must not put its end beyond it.
-    if !(times[0] < unit_of(domain) && times[0] < (steps_to_stop() - 4.0 * ULP) * flow.h) {
+    if !(times[0] < unit_of(domain) && times[0] < (to_stop - 4.0 * ULP) * flow.h) {
         held_gap = GAPS;
         return 0.0;
     }

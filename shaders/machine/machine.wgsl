@@ -31,6 +31,26 @@ fn begin_schedule() {
 
 fn restart_phase() {}
 
+fn set_tangent(i: u32, u: State) {
+    var v = u;
+    for (var k = 0u; k < shape.dim; k++) {
+        if GROWTH {
+            tangent_now[k] = v[k];
+        } else {
+            motions[lane].tangents[DIM * i + k] = v[k];
+        }
+    }
+}
+
+// Returns a column of the monodromy matrix.
+fn column(i: u32) -> State {
+    var u: State;
+    for (var k = 0u; k < shape.dim; k++) {
+        u[k] = motions[lane].tangents[DIM * i + k];
+    }
+    return u;
+}
+
 // Projects a tangent vector to the constraints: what is at rest is also at rest in neighbouring motions.
 fn constrained(u: State) -> State {
     var v = u;

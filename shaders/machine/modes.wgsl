@@ -40,8 +40,8 @@ fn are_consistent(q: State) -> bool {
             if slip == STICKS {
                 if has_hold(domain, i) {
                     load_sizes(q);
-                    let row = hold_row(domain, i);
-                    if abs(product(row, 0u)) > element_force(i) + ROUNDING * size_of_product(row) {
+                    let held = product_and_size(hold_row(domain, i), 0u);
+                    if abs(held.x) > element_force(i) + ROUNDING * held.y {
                         return false;
                     }
                 }
@@ -99,14 +99,6 @@ fn choose(q: State, keeps: bool) -> bool {
     return false;
 }
 
-// Loads a point whose numbers are replaced by their absolute values.
-fn load_sizes(q: State) {
-    load_point(q);
-    for (var i = 0u; i < shape.width; i++) {
-        sizes[i] = abs(series[i]);
-    }
-}
-
 fn is_stuck(mode: u32) -> bool {
     return mode >= STUCK;
 }
@@ -131,18 +123,19 @@ fn hold(q: ptr<function, State>, speeds: Real) {
             continue;
         }
         let row = AT_ELEMENTS + i * (WIDTH + 1u);
-        if n < ELEMENTS {
-            var pivot = COORDINATES;
-            var most: Real = 0.0;
-            for (var j = 0u; j < shape.coordinates; j++) {
-                let size = abs(number(row + 2u * j + 1u));
-                if ((held >> j) & 1u) == 0u && size > most {
-                    pivot = j;
-                    most = size;
-                }
+        var factors: array<Real, COORDINATES>;
+        var widest = COORDINATES;
+        var most: Real = 0.0;
+        for (var j = 0u; j < shape.coordinates; j++) {
+            factors[j] = number(row + 2u * j + 1u);
+            if ((held >> j) & 1u) == 0u && abs(factors[j]) > most {
+                widest = j;
+                most = abs(factors[j]);
             }
-            pivots[i] = pivot;
-            held |= (1u << pivot);
+        }
+        if n < ELEMENTS {
+            pivots[i] = widest;
+            held |= (1u << widest);
         }
         let pivot = pivots[i];
         if pivot == COORDINATES {
@@ -152,9 +145,9 @@ fn hold(q: ptr<function, State>, speeds: Real) {
         var rest = speeds * number(row + WIDTH - 1u);
         for (var j = 0u; j < shape.coordinates; j++) {
             if j != pivot {
-                rest += number(row + 2u * j + 1u) * (*q)[2u * j + 1u];
+                rest += factors[j] * (*q)[2u * j + 1u];
             }
         }
-        (*q)[2u * pivot + 1u] = -rest / number(row + 2u * pivot + 1u);
+        (*q)[2u * pivot + 1u] = -rest / factors[pivot];
     }
 }

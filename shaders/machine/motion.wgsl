@@ -133,45 +133,44 @@ fn watch(number_of_watch: u32, domain: u32) -> Watch {
     if is_kept(domain, gap) {
         return found;
     }
+    // The wall that the gap may reach, and the direction to it.
+    var wall = vec2<u32>(side, NO_WALL);
+    var direction = nth;
     if mode < ONSET {
         if nth < 2u {
-            let wall = wall_ahead(gap, nth);
-            if wall.y != NO_WALL {
-                found.kind = ENDS_AT_WALL;
-                found.side = nth;
-                found.line = distance_line(gap, wall_at(gap, wall.x, wall.y), nth);
-                found.order = order_from_wall(gap, nth);
-            }
+            wall = wall_ahead(gap, nth);
         } else if pushing_side(gap) != SIDE_NONE {
             found.kind = ENDS_FORCE;
-            found.line = force_line(gap, side, 1.0);
-            found.order = from_force[gap];
         }
     } else if mode < PRESSED {
         if nth == 0u {
             found.kind = ENDS_ONSET;
-            found.line = distance_line(gap, last_wall_at(gap, side), side);
-            found.order = order_from_wall(gap, side);
+            direction = side;
+            wall.y = wall_count(gap, side) - 1u;
         } else if nth == 1u {
             found.kind = ENDS_PRESSING;
             found.line = row_line(acceleration_row(domain, gap), sign_of(side));
             found.order = from_force[gap];
         } else {
-            let wall = wall_behind(gap, side);
-            if wall.y != NO_WALL {
-                found.kind = ENDS_AT_WALL;
-                found.side = 1u - side;
-                found.line = distance_line(gap, wall_at(gap, wall.x, wall.y), 1u - side);
-                found.order = order_from_wall(gap, 1u - side);
-            }
+            direction = 1u - side;
+            wall = wall_behind(gap, side);
         }
     } else if nth == 0u {
         found.kind = LEAVES;
-        found.line = distance_line(gap, last_wall_at(gap, side), 1u - side);
-        found.order = order_from_wall(gap, 1u - side);
+        direction = 1u - side;
+        wall.y = wall_count(gap, side) - 1u;
     } else if nth == 1u && mode >= OPEN {
         found.kind = BEGINS_FORCE;
-        found.line = force_line(gap, side, -1.0);
+    }
+    if wall.y != NO_WALL {
+        found.line = distance_line(gap, wall_at(gap, wall.x, wall.y), direction);
+        found.order = order_from_wall(gap, direction);
+        if found.kind == ENDS_NOTHING {
+            found.kind = ENDS_AT_WALL;
+            found.side = direction;
+        }
+    } else if found.kind == ENDS_FORCE || found.kind == BEGINS_FORCE {
+        found.line = force_line(gap, side, select(Real(-1.0), Real(1.0), found.kind == ENDS_FORCE));
         found.order = from_force[gap];
     }
     return found;
@@ -196,10 +195,12 @@ fn change_theta() -> Real {
 
 // Takes one step to the first event, or as far as the series or the grid allow. Returns whether the step ends at a stop phase.
 fn step() -> bool {
+    load_phase();
     let domain = present_domain();
+    let to_stop = steps_to_stop();
     var time_of_rest: Real = 0.0;
     if leaving_gap < GAPS {
-        time_of_rest = begin_rest(domain);
+        time_of_rest = begin_rest(domain, to_stop);
         leaving_gap = GAPS;
         if time_of_rest == 0.0 {
             // The dispatch may end here.
@@ -213,12 +214,9 @@ fn step() -> bool {
             set_tangent(n, constrained(tangent(n)));
         }
     }
-    let remaining = min(steps_to_stop(), 1.0 - motion.theta) * flow.h;
+    let remaining = min(to_stop, 1.0 - motion.theta) * flow.h;
     let h = select(min(unit_of(domain), remaining), time_of_rest, time_of_rest > 0.0);
-    load_point(motion.q);
-    for (var i = 0u; i < shape.width; i++) {
-        sizes[i] = abs(series[i]);
-    }
+    load_sizes(motion.q);
     expand(domain, h);
     var first = no_watch();
     var share: Real = 1.0;
@@ -232,7 +230,7 @@ fn step() -> bool {
             powers[k] = value_of(candidate.line, k);
         }
         var order = candidate.order;
-        let size = size_of_value(candidate.line);
+        let size = value_and_size(candidate.line, 0u, product_and_size(candidate.line.row, 0u)).y;
         if candidate.kind == BEGINS_SLIDING && abs(powers[0]) <= ROUNDING * size && powers[1] > 0.0 {
             // The force has just touched its limit.
             order = 1u;
@@ -329,7 +327,7 @@ fn advance(domain: u32, share: Real, time: Real) {
     motion.theta = min(motion.theta, 1.0 - 2.0 * ULP);
     var is_in_contact = false;
     for (var gap = 0u; gap < GAPS; gap++) {
-        is_in_contact = is_in_contact || contact_of(contact_mode(gap)) != SIDE_NONE;
+        is_in_contact = is_in_contact || contact_of(contact_mode(gap, gap_modes[gap])) != SIDE_NONE;
         if !is_kept(domain, gap) {
             wall_side[gap] = SIDE_NONE;
         }
@@ -343,58 +341,70 @@ fn advance(domain: u32, share: Real, time: Real) {
     }
 }
 
-// Mode of a gap that says which contact it has.
-fn contact_mode(gap: u32) -> u32 {
-    let mode = gap_modes[gap];
+// Mode that says which contact a gap in this mode has.
+fn contact_mode(gap: u32, mode: u32) -> u32 {
     if mode >= OPEN && mode < STUCK {
         return before_last(gap, contact_of(mode));
     }
     return mode;
 }
 
-// Counts an event at a wall, and adds the symbol of the flight that ends there.
+// Counts an event at a wall.
 fn count_event(gap: u32, side: u32) {
-    let at = contact_of(contact_mode(gap));
-    var symbol = select(4u, 1u, at == SIDE_RIGHT);
-    if at == SIDE_NONE {
-        let is_right = side == SIDE_RIGHT;
-        symbol = select(select(6u, 5u, !is_right), select(3u, 2u, is_right), origins[gap] == SIDE_RIGHT);
-    }
-    symbol += select(0u, 8u * (gap + 1u), GAPS > 1u);
-    note(select(symbol, NO_SYMBOL, at == SIDE_NONE && origins[gap] == SIDE_NONE), 1u + side + 2u * (gap_modes[gap] + 32u * gap));
-    origins[gap] = side;
+    note(FIRST_AT_WALL + side + 2u * (gap_modes[gap] + 32u * gap));
 }
 
 // Counts a change of friction; adds its symbol unless `symbol` is NO_SYMBOL.
 fn count_slip(symbol: u32) {
-    note(symbol, 512u + symbol);
+    note(512u + symbol);
 }
 
 const NO_SYMBOL: u32 = 64u;
 const STICKING_ENDS: u32 = 7u;
 const SLIDING_REVERSES: u32 = 0u;
 
-// Symbols and codes of the events of one instant. They are counted together in one call, because drivers copy a function to each call.
+// Codes of the events of one instant. They are counted together in one call, because drivers copy a function to each call. Codes below 512
+// have no symbol.
+const FIRST_AT_WALL: u32 = 1024u;
 const MOST_NOTES: u32 = 16u;
-var<private> noted_symbols: array<u32, MOST_NOTES>;
-var<private> noted_codes: array<u32, MOST_NOTES>;
+var<private> notes: array<u32, MOST_NOTES>;
 var<private> note_count: u32;
 
-fn note(symbol: u32, code: u32) {
+fn note(code: u32) {
     if note_count < MOST_NOTES {
-        noted_symbols[note_count] = symbol;
-        noted_codes[note_count] = code;
+        notes[note_count] = code;
         note_count += 1u;
     }
 }
 
+// Returns the symbol of the flight that ends with an event at a wall. The gap's next flight begins there.
+fn symbol_at_wall(gap: u32, side: u32, mode: u32) -> u32 {
+    let origin = origins[gap];
+    origins[gap] = side;
+    let at = contact_of(contact_mode(gap, mode));
+    var symbol = select(4u, 1u, at == SIDE_RIGHT);
+    if at == SIDE_NONE {
+        let is_right = side == SIDE_RIGHT;
+        symbol = select(select(6u, 5u, !is_right), select(3u, 2u, is_right), origin == SIDE_RIGHT);
+    }
+    symbol += select(0u, 8u * (gap + 1u), GAPS > 1u);
+    return select(symbol, NO_SYMBOL, at == SIDE_NONE && origin == SIDE_NONE);
+}
+
 fn count_notes() {
     for (var n = 0u; n < note_count; n++) {
-        if noted_symbols[n] != NO_SYMBOL {
-            add_symbol(noted_symbols[n]);
+        var code = notes[n];
+        var symbol = select(NO_SYMBOL, code - 512u, code >= 512u);
+        if code >= FIRST_AT_WALL {
+            code -= FIRST_AT_WALL;
+            symbol = symbol_at_wall(code / 64u, code % 2u, (code / 2u) % 32u);
+            code += 1u;
+        }
+        if symbol != NO_SYMBOL {
+            add_symbol(symbol);
         }
         keep_strobe_distance();
-        tally.itinerary = mix_bits(tally.itinerary + noted_codes[n]);
+        tally.itinerary = mix_bits(tally.itinerary + code);
         tally.events += 1u;
         tally.events_in_period += 1u;
     }
@@ -417,34 +427,32 @@ fn jump(u: State) -> State {
     return v;
 }
 
-// Returns the time derivative of the present state.
-fn field(domain: u32) -> State {
-    load_point(motion.q);
-    differentiate(domain, 0u, 1.0);
-    var f: State;
-    for (var i = 0u; i < shape.dim; i++) {
-        f[i] = series[WIDTH + i];
-    }
-    return f;
-}
+// Time derivative of the state before an event. It stays in memory: an array in registers is slow to compile if it lives for long.
+var<private> comes: State;
 
 // Processes the event that ends the present modes, and applies its saltation to the tangents.
 fn cross(event: Watch, domain: u32) {
+    load_phase();
     let is_at_wall = event.kind == ENDS_AT_WALL || event.kind == ENDS_ONSET || event.kind == LEAVES;
     if is_at_wall {
         motion.q[event.line.entry] = -event.line.constant / event.line.factor;
     }
-    var before: State;
     var rate: Real = 0.0;
     if VECTORS > 0u {
-        before = field(domain);
+        load_point(motion.q);
+        differentiate(domain, 0u, 1.0);
+        for (var i = 0u; i < shape.dim; i++) {
+            comes[i] = series[WIDTH + i];
+        }
         rate = select(value_of(event.line, 1u), Real(-1.0), event.kind == ENDS_SERIES);
     }
     kick_factor = 0.0;
-    act(event);
+    act(event, domain);
+    let next = present_domain();
+    complete_orders(next);
     count_notes();
     if VECTORS > 0u && event.kind != BEGINS_STAGE {
-        saltate(event, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), before, rate);
+        saltate(event, next, select(Real(0.0), NO_SPEED * flow.speed, is_at_wall), rate);
     }
     let has_left = event.kind == ENDS_AT_WALL && kick_factor != 0.0 && gap_modes[event.index] == before_last(event.index, event.side);
     if has_left && resting_gaps() == held_gaps {
@@ -454,17 +462,18 @@ fn cross(event: Watch, domain: u32) {
 }
 
 // Applies `S u = R u + (f+ - R f-) (n . u) / (n . f-)` to every tangent vector, and projects it to the constraints.
-fn saltate(event: Watch, least: Real, before: State, rate: Real) {
-    var change = field(present_domain());
-    leaves = change;
-    var carried = jump(before);
+fn saltate(event: Watch, domain: u32, least: Real, rate: Real) {
+    load_point(motion.q);
+    differentiate(domain, 0u, 1.0);
+    var change = jump(comes);
     let inverse = select(1.0 / rate, Real(0.0), abs(rate) <= least);
     let is_passed = event.kind == ENDS_AT_WALL || event.kind == LEAVES;
     if abs(rate) <= least && (kick_factor != 0.0 || !is_passed) {
         tally.grazes += 1u;
     }
     for (var i = 0u; i < shape.dim; i++) {
-        change[i] = (change[i] - carried[i]) * inverse;
+        leaves[i] = series[WIDTH + i];
+        change[i] = (leaves[i] - change[i]) * inverse;
     }
     for (var n = 0u; n < VECTORS; n++) {
         let u = tangent(n);
@@ -479,7 +488,7 @@ fn saltate(event: Watch, least: Real, before: State, rate: Real) {
     check_range();
 }
 
-fn act(event: Watch) {
+fn act(event: Watch, domain: u32) {
     let i = event.index;
     var exempt_gap = GAPS;
     var exempt_element = ELEMENTS;
@@ -533,7 +542,7 @@ fn act(event: Watch) {
             stopped = i;
         }
         case BEGINS_SLIDING: {
-            begin_sliding(i, event.side);
+            begin_sliding(i, event.side, domain);
             exempt_element = i;
         }
         case ENDS_SERIES: {
@@ -551,7 +560,6 @@ fn act(event: Watch) {
     }
     if has_outcome {
         gap_modes[i] = tried_gaps[i];
-        change_modes(ELEMENTS);
         if is_stuck(gap_modes[i]) {
             wall_side[i] = SIDE_NONE;
         } else {
@@ -562,7 +570,6 @@ fn act(event: Watch) {
     if event.kind != ENDS_ONSET {
         settle(exempt_gap, exempt_element, stopped);
     }
-    complete_orders();
 }
 
 // Begins contact with a wall that only pushes.
@@ -585,8 +592,7 @@ fn leave(gap: u32, direction: u32) {
 }
 
 // Computes the orders of all roots at the present state.
-fn complete_orders() {
-    let domain = present_domain();
+fn complete_orders(domain: u32) {
     for (var n = 0u; n < GAPS + ELEMENTS; n++) {
         let is_gap = n < GAPS;
         let gap = min(n, GAPS - 1u);
@@ -651,7 +657,7 @@ fn reach(gap: u32, direction: u32) {
         // Ends alternating impacts of two gaps: both leave their walls from rest.
         motion.q[2u * gap + 1u] = 0.0;
         tally.grazes += 1u;
-        note(NO_SYMBOL, 0u);
+        note(0u);
         leave(gap, direction);
         return;
     }
@@ -707,18 +713,18 @@ fn power(x: Real, p: Real) -> Real {
 
 // Returns the leaving speed below which the flights of a series of impacts are not followed, at the loaded point.
 fn lowest_speed(domain: u32, gap: u32) -> Real {
-    return sqrt(2.0 * LOWEST_FLIGHT * flow.length * abs(product(acceleration_row(domain, gap), 0u)));
+    return sqrt(2.0 * LOWEST_FLIGHT * flow.length * abs(product_and_size(acceleration_row(domain, gap), 0u).x));
 }
 
 // Processes an impact, after which the gap leaves the wall, or a lasting contact begins.
 fn impact(gap: u32, side: u32) {
+    load_mobilities();
     let approach = sign_of(side) * rate_of_gap(gap);
     let law = restitution(gap, side, approach);
     let e = law[0];
     let leaving = e * approach;
     let is_rigid = last_kind(gap, side) == LAST_RIGID;
     let mesh_speed = laws[cell.law_index][2u * gap + side][3];
-    var before: State = motion.q;
     var kept = 0u;
     var lasts = false;
     var next = motion.q;
@@ -734,7 +740,7 @@ fn impact(gap: u32, side: u32) {
             if stops == 1u && !(is_slow && is_rigid) {
                 break;
             }
-            var q = before;
+            var q = motion.q;
             let change = select((1.0 + e) * approach, approach, stops == 1u);
             for (var i = 0u; i < shape.coordinates; i++) {
                 q[2u * i + 1u] -= sign_of(side) * kick[i] * change;
@@ -774,7 +780,6 @@ fn impact(gap: u32, side: u32) {
                     break;
                 }
                 pressing = value;
-                load_point(q);
                 is_slow = leaving <= max(mesh_speed, lowest_speed(domain, gap));
                 if !is_slow || is_rigid || !(pressing > 0.0) {
                     break;
@@ -791,7 +796,6 @@ fn impact(gap: u32, side: u32) {
             if low == 0u && ((let_go >> other) & 1u) == 1u {
                 let at = (gap_modes[other] + 1u) % 2u;
                 let presses = lead(distance_line(other, 0.0, 1u - at), domain, next, 2u).value > 0.0;
-                load_point(next);
                 if presses && -sign_of(at) * next[2u * other + 1u] <= lowest_speed(domain, other) {
                     low = 1u << other;
                 }
@@ -933,8 +937,19 @@ fn joint_impact(gap: u32, side: u32, kept: u32) -> u32 {
     return 0u;
 }
 
-fn mobility(i: u32, j: u32) -> Real {
-    return number(AT_MOBILITY + i * COORDINATES + j);
+// Changes of all rates per impulse on each gap. They are copied from the table, because each place that reads it takes long to compile.
+var<private> mobilities: array<Real, GAPS * COORDINATES>;
+
+fn load_mobilities() {
+    for (var gap = 0u; gap < GAPS; gap++) {
+        for (var i = 0u; i < shape.coordinates; i++) {
+            mobilities[gap * COORDINATES + i] = number(AT_MOBILITY + i * COORDINATES + gap);
+        }
+    }
+}
+
+fn mobility(i: u32, gap: u32) -> Real {
+    return mobilities[gap * COORDINATES + i];
 }
 
 // Chooses modes of friction and of other gaps at rest after a jump of the rates to `q`. The tried modes of the gaps are given. Returns
@@ -1005,8 +1020,7 @@ fn list_rest(domain: u32) {
 }
 
 // Processes an element that breaks away.
-fn begin_sliding(i: u32, next: u32) {
-    let before = present_domain();
+fn begin_sliding(i: u32, next: u32, before: u32) {
     let slip = slips[i];
     slips[i] = next;
     let domain = present_domain();
@@ -1046,36 +1060,39 @@ fn begin_sliding(i: u32, next: u32) {
 // Decides all modes that depend on forces again, after a jump of forces or rates. The exempt gap or element was just decided and is left
 // out. The sliding rate of the element `stopped` has just vanished.
 fn settle(exempt_gap: u32, exempt_element: u32, stopped: u32) {
-    for (var n = 0u; n < MOST_DECISIONS; n++) {
-        let domain = present_domain();
-        let ends_sliding = n == 0u && stopped < ELEMENTS;
-        if !ends_sliding && settle_pushing(domain) {
-            continue;
-        }
-        list_rest(domain);
-        if ends_sliding {
-            rest_element[stopped] = 1u;
-        }
-        if exempt_gap < GAPS {
-            rest_side[exempt_gap] = SIDE_NONE;
-        }
-        if exempt_element < ELEMENTS {
-            rest_element[exempt_element] = 0u;
-        }
-        let has_choice = choose(motion.q, !ends_sliding);
-        if ends_sliding && tried_slips[stopped] == slips[stopped] {
-            // The sliding rate only touches 0, or starts with the wrong sign by rounding.
-            tally.grazes += 1u;
-            note(NO_SYMBOL, 1u);
-            from_rate[stopped] = UNKNOWN_ORDER;
-            continue;
-        }
-        if !has_choice {
-            tally.grazes += 1u;
-            break;
-        }
-        if are_tried_modes_present() {
-            break;
+    // Round 0 enters the modes that an impact or a series of impacts has ended with.
+    for (var n = select(1u, 0u, has_outcome); n <= MOST_DECISIONS; n++) {
+        let ends_sliding = n == 1u && stopped < ELEMENTS;
+        if n > 0u {
+            let domain = present_domain();
+            if !ends_sliding && settle_pushing(domain) {
+                continue;
+            }
+            list_rest(domain);
+            if ends_sliding {
+                rest_element[stopped] = 1u;
+            }
+            if exempt_gap < GAPS {
+                rest_side[exempt_gap] = SIDE_NONE;
+            }
+            if exempt_element < ELEMENTS {
+                rest_element[exempt_element] = 0u;
+            }
+            let has_choice = choose(motion.q, !ends_sliding);
+            if ends_sliding && tried_slips[stopped] == slips[stopped] {
+                // The sliding rate only touches 0, or starts with the wrong sign by rounding.
+                tally.grazes += 1u;
+                note(1u);
+                from_rate[stopped] = UNKNOWN_ORDER;
+                continue;
+            }
+            if !has_choice {
+                tally.grazes += 1u;
+                break;
+            }
+            if are_tried_modes_present() {
+                break;
+            }
         }
         change_modes(select(ELEMENTS, stopped, ends_sliding));
     }
@@ -1174,9 +1191,9 @@ fn change_slips(stopped: u32) {
         from_rate[i] = 0u;
         if after != STICKS {
             load_sizes(motion.q);
-            let line = rate_line(i, 1.0);
+            let rate = product_and_size(rate_line(i, 1.0).row, 0u);
             // An element that has just stopped has a small rate, because the time of its stop has a rounding error.
-            if i == stopped || abs(value_of(line, 0u)) <= ROUNDING * size_of_value(line) {
+            if i == stopped || abs(rate.x) <= ROUNDING * rate.y {
                 from_rate[i] = UNKNOWN_ORDER;
             }
         }

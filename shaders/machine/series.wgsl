@@ -5,10 +5,9 @@ var<private> series: array<Real, SERIES>;
 // Sums of the absolute values of the terms that were added in each number of a point.
 var<private> sizes: array<Real, WIDTH>;
 
-// Number of loop iterations over the rates and over the numbers of a point. Inner loops count, because some drivers count the iterations of
-// all loops of a dispatch and stop at a limit.
+// Number of loop iterations over the rates. Inner loops count, because some drivers count the iterations of all loops of a dispatch and stop
+// at a limit.
 const TRIPS_OF_RATES: u32 = COORDINATES * (1u + WIDTH / 4u) + HARMONICS + 4u;
-const TRIPS_OF_POINT: u32 = WIDTH + HARMONICS;
 
 // Number of derivatives that are compared with zero.
 const DERIVATIVES: u32 = 4u;
@@ -95,53 +94,79 @@ fn product(row: u32, k: u32) -> Real {
     return sum;
 }
 
-fn size_of_product(row: u32) -> Real {
-    let t = shape.machine + row;
-    var sum: Real = 0.0;
-    for (var j = 0u; j < shape.width; j += 4u) {
-        sum += (abs(table[t + j]) * sizes[j] + abs(table[t + j + 1u]) * sizes[j + 1u])
-            + (abs(table[t + j + 2u]) * sizes[j + 2u] + abs(table[t + j + 3u]) * sizes[j + 3u]);
+// Returns `product(row, k)` and the sum of the sizes of its terms. Used for events: it is slower than `product`, but compiles faster, because
+// some drivers write a loop for each place that reads a table.
+fn product_and_size(row: u32, k: u32) -> vec2<Real> {
+    var sum = vec2<Real>();
+    var pair = vec2<Real>();
+    var first_pair = vec2<Real>();
+    for (var j = 0u; j < shape.width; j++) {
+        let factor = number(row + j);
+        let term = vec2<Real>(factor * series[k * WIDTH + j], abs(factor) * sizes[j]);
+        // Adds the terms in the order of `product`.
+        pair = select(pair + term, term, j % 2u == 0u);
+        first_pair = select(first_pair, pair, j % 4u == 1u);
+        sum = select(sum, sum + (first_pair + pair), j % 4u == 3u);
     }
     return sum;
 }
 
-fn value_of(line: Line, k: u32) -> Real {
+// Value of a line without its row at term `k`.
+fn value_of_entries(line: Line, k: u32) -> Real {
     let p = k * WIDTH;
-    var value = (line.factor * series[p + line.entry] + line.rate_factor * series[p + line.entry + 1u]) + line.constant * series[p + WIDTH - 1u];
+    return (line.factor * series[p + line.entry] + line.rate_factor * series[p + line.entry + 1u]) + line.constant * series[p + WIDTH - 1u];
+}
+
+fn value_of(line: Line, k: u32) -> Real {
+    var value = value_of_entries(line, k);
     if line.scale != 0.0 {
         value += line.scale * product(line.row, k);
     }
     return value;
 }
 
-// Sum of the absolute values of the terms of a row's value.
-fn size_of_value(line: Line) -> Real {
-    var size = (abs(line.factor) * sizes[line.entry] + abs(line.rate_factor) * sizes[line.entry + 1u]) + abs(line.constant) * sizes[WIDTH - 1u];
-    if line.scale != 0.0 {
-        size += abs(line.scale) * size_of_product(line.row);
-    }
-    return size;
+// Value of a line at term `k`, and the sum of the sizes of its terms. `of_row`: `product_and_size` of its row.
+fn value_and_size(line: Line, k: u32, of_row: vec2<Real>) -> vec2<Real> {
+    let size = (abs(line.factor) * sizes[line.entry] + abs(line.rate_factor) * sizes[line.entry + 1u]) + abs(line.constant) * sizes[WIDTH - 1u];
+    let sum = vec2<Real>(value_of_entries(line, k), size);
+    return select(sum, sum + vec2<Real>(line.scale, abs(line.scale)) * of_row, line.scale != 0.0);
 }
 
-// Makes a state at the present phase the first term.
-fn load_point(q: State) {
-    var y = q;
-    iterations += TRIPS_OF_POINT;
-    for (var i = 0u; i < shape.dim; i++) {
-        series[i] = y[i];
-    }
+// The numbers of a point at the present phase that do not depend on the state.
+var<private> phase_numbers: array<Real, WIDTH>;
+
+// Computes `phase_numbers`, after each change of the phase.
+fn load_phase() {
+    iterations += HARMONICS;
     for (var m = 0u; m < HARMONICS; m++) {
         let place = shape.phasors + 2u * (HARMONICS * tally.step + m);
         let c = table[place];
         let s = table[place + 1u];
         let turn = small_turn(motion.theta * Real(shape.orders[m]) * flow.omega * flow.h);
-        series[DIM + 2u * m] = c + (turn.x * c - turn.y * s);
-        series[DIM + 2u * m + 1u] = s + (turn.y * c + turn.x * s);
+        phase_numbers[DIM + 2u * m] = c + (turn.x * c - turn.y * s);
+        phase_numbers[DIM + 2u * m + 1u] = s + (turn.y * c + turn.x * s);
     }
-    for (var i = shape.dim + 2u * HARMONICS; i < shape.width; i++) {
-        series[i] = 0.0;
+    phase_numbers[WIDTH - 1u] = 1.0;
+}
+
+// Makes a state at the present phase the first term.
+fn load_point(q: State) {
+    var y = q;
+    iterations += WIDTH;
+    for (var i = 0u; i < shape.dim; i++) {
+        series[i] = y[i];
     }
-    series[WIDTH - 1u] = 1.0;
+    for (var i = shape.dim; i < shape.width; i++) {
+        series[i] = phase_numbers[i];
+    }
+}
+
+// Loads a point, and the absolute values of its numbers.
+fn load_sizes(q: State) {
+    load_point(q);
+    for (var i = 0u; i < shape.width; i++) {
+        sizes[i] = abs(series[i]);
+    }
 }
 
 // Makes a tangent vector the first term.
@@ -170,6 +195,14 @@ fn differentiate(domain: u32, k: u32, factor: Real) {
             series[to_term + 2u * i + 1u] -= kick[i] * excess;
         }
     }
+    differentiate_phase(k, factor);
+    iterations += TRIPS_OF_RATES;
+}
+
+// The part of `differentiate` that does not depend on the state.
+fn differentiate_phase(k: u32, factor: Real) {
+    let from_term = k * WIDTH;
+    let to_term = from_term + WIDTH;
     for (var m = 0u; m < HARMONICS; m++) {
         let turn = factor * Real(shape.orders[m]) * flow.omega;
         let at = DIM + 2u * m;
@@ -179,7 +212,6 @@ fn differentiate(domain: u32, k: u32, factor: Real) {
     for (var i = shape.dim + 2u * HARMONICS; i < shape.width; i++) {
         series[to_term + i] = 0.0;
     }
-    iterations += TRIPS_OF_RATES;
 }
 
 // Computes the terms of a step of length `h`.
@@ -209,34 +241,35 @@ struct Lead {
     value: Real,
 }
 
-// Returns the lowest nonzero derivative of order `least` or higher, for a state at the present phase. Only its sign has a meaning.
+// Returns the lowest nonzero derivative of order `least` or higher, for a state at the present phase. Only its sign has a meaning. The state
+// stays loaded.
 fn lead(line: Line, domain: u32, q: State, least: u32) -> Lead {
-    load_point(q);
-    for (var i = 0u; i < shape.width; i++) {
-        sizes[i] = abs(series[i]);
-    }
+    load_sizes(q);
     let unit = unit_of(domain);
     var order = 0u;
     for (; order < least + DERIVATIVES; order++) {
-        if order >= least {
-            let value = value_of(line, order);
-            if abs(value) > ROUNDING * size_of_value(line) {
-                return Lead(order, value);
+        iterations += (COORDINATES + 1u) * (1u + WIDTH) + 2u * WIDTH + HARMONICS;
+        let to_term = (order + 1u) * WIDTH;
+        // One loop for the rows of all accelerations and that of the line, because drivers copy a function to each call.
+        var found: vec2<Real>;
+        for (var i = 0u; i <= shape.coordinates; i++) {
+            let is_rate = i < shape.coordinates;
+            found = product_and_size(select(line.row, acceleration_row(domain, i), is_rate), order);
+            if is_rate {
+                series[to_term + 2u * i] = unit * series[order * WIDTH + 2u * i + 1u];
+                series[to_term + 2u * i + 1u] = unit * found.x;
+                // Each new size depends on all old sizes, so they are stored separately.
+                next_sizes[2u * i] = unit * sizes[2u * i + 1u];
+                next_sizes[2u * i + 1u] = unit * found.y;
             }
         }
-        differentiate(domain, order, unit);
-        iterations += TRIPS_OF_RATES + 2u * TRIPS_OF_POINT;
-        for (var i = 0u; i < shape.coordinates; i++) {
-            let rate = sizes[2u * i + 1u];
-            // Each new size depends on all old sizes, so they are stored separately.
-            next_sizes[2u * i] = unit * rate;
-            next_sizes[2u * i + 1u] = unit * size_of_product(acceleration_row(domain, i));
+        let of_line = value_and_size(line, order, found);
+        if order >= least && abs(of_line.x) > ROUNDING * of_line.y {
+            return Lead(order, of_line.x);
         }
-        for (var i = 0u; i < shape.dim; i++) {
-            sizes[i] = next_sizes[i];
-        }
-        for (var i = shape.dim; i < shape.width; i++) {
-            sizes[i] = abs(series[(order + 1u) * WIDTH + i]);
+        differentiate_phase(order, unit);
+        for (var i = 0u; i < shape.width; i++) {
+            sizes[i] = select(abs(series[to_term + i]), next_sizes[min(i, DIM - 1u)], i < shape.dim);
         }
     }
     return Lead(order, 0.0);

@@ -1,5 +1,24 @@
 // Tangent vectors of an oscillator with one gap: propagation along a flight, and saltation at events.
 
+fn set_tangent(i: u32, u: State) {
+    if GROWTH {
+        tangent_now = u;
+        return;
+    }
+    //% for k in 0..DIM
+    motions[lane].tangents[DIM * i + $ku] = u[$ku];
+    //% end
+}
+
+// Returns a column of the monodromy matrix.
+fn column(i: u32) -> State {
+    var u: State;
+    //% for k in 0..DIM
+    u[$ku] = motions[lane].tangents[DIM * i + $ku];
+    //% end
+    return u;
+}
+
 // Carries the columns of the monodromy matrix over full steps. Each vector counts as one iteration.
 fn step_columns(count: u32) {
     let m = propagator();
