@@ -9,6 +9,7 @@
 //! coefficients of a model at other values of a parameter give the derivatives of coefficients.
 
 mod branch;
+mod curve;
 mod equations;
 mod family;
 mod flight;
@@ -16,11 +17,13 @@ mod flight;
 pub use branch::{
     Branch, BranchEnd, BranchLimits, BranchPoint, Special, SpecialPoint, follow, follow_on, switch,
 };
+pub use curve::{Condition, Seed, curve};
 pub use family::Free;
 
 use std::f64::consts::TAU;
 
 use equations::Linearised;
+use family::{Laws, Slopes};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::machine::{MachineMotion, Passage, System};
@@ -29,7 +32,7 @@ use crate::motion::{GapEvent, Observer, SlipEvent, States, Stop};
 use crate::word::Word;
 
 /// Largest number of Newton steps.
-const MOST_STEPS: usize = 30;
+const MOST_STEPS: usize = 15;
 
 /// Newton's method ends at steps below this, relative to the scales of the unknowns.
 const CONVERGED: f64 = 1e-13;
@@ -42,8 +45,14 @@ const SHRINKS: f64 = 0.9;
 /// motion's times have the square root of rounding errors.
 const NEAR: f64 = 1e-6;
 
+/// Largest distance of a cycle from a shorter one where two branches meet, relative to the scales of the unknowns.
+const SAME: f64 = 1e-4;
+
 /// Time from phase 0, in turns, within which an event may pass it.
 const BESIDE: f64 = 1e-3;
+
+/// Ratio of two steps above which the method leads elsewhere.
+const GROWS: f64 = 2.0;
 
 /// Steps longer than this, relative to the scales of the unknowns, do not lead to a cycle.
 const LONGEST: f64 = 1e3;
@@ -94,6 +103,9 @@ pub struct Solution {
 /// One more equation: its derivatives by all unknowns, and its residual.
 type Extra = (RowDVector<f64>, f64);
 
+/// Returns further equations at approximate values of the unknowns.
+type Extras<'a> = dyn Fn(&Laws, &Linearised, &Solution) -> Result<Vec<Extra>, CycleError> + 'a;
+
 impl Itinerary {
     /// Follows the motion from a state at phase 0 for a number of half forcing periods. If the number is odd, the cycle is its own mirror image.
     ///
@@ -139,13 +151,15 @@ impl Itinerary {
         let system = System::new(
             &placed(model, &free, &solution.values.rows(0, free.len()).into_owned()).oscillator()?,
         );
+        let halves = self.half_periods(&system);
+        let periods = if self.mirrored { halves } else { halves / 2 };
         // The symbol of the first flight depends on the last event of the cycle.
         let (mut before, mut symbols) = (None, Symbols(Vec::new()));
         for _ in 0..2 {
             let start = MachineMotion::new(&system, &solution.state());
             let mut motion = start.in_modes(&self.passages[0], before.as_ref());
             symbols.0.clear();
-            for _ in 0..self.half_periods(&system) / 2 {
+            for _ in 0..periods {
                 motion.advance_period(&mut symbols).map_err(CycleError::Stop)?;
             }
             before = Some(motion);
@@ -157,24 +171,42 @@ impl Itinerary {
     /// this is not so is no cycle of the model: it passes through a wall, for example.
     pub fn is_followed(&self, model: &dyn Model, solution: &Solution) -> bool {
         let Ok(oscillator) = model.oscillator() else { return false };
+        // Half a cycle shows the other half only if the laws are their own mirror image.
+        if self.mirrored && !oscillator.mirror_symmetric() {
+            return false;
+        }
         let system = System::new(&oscillator);
         let half_periods = self.half_periods(&system);
         let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
         let Ok(passages) = motion.passages(half_periods) else { return false };
         let Ok(scales) = self.scales(model, solution, &[]) else { return false };
-        let is_near = |(passage, end): (&Passage, &DVector<f64>)| {
+        let is_near = |passage: &Passage, end: &DVector<f64>| {
             let difference = in_blocks(&passage.state, system.degrees()) - end;
             difference.iter().zip(&scales).all(|(x, scale)| x.abs() <= NEAR * scale)
         };
-        passages.iter().zip(&solution.ends).all(is_near)
-            && self.is_like(&Itinerary { passages, mirrored: self.mirrored })
+        // At a touch the motion may have a tiny event.
+        let times = self.passages.iter().zip(&solution.turns);
+        let touches: Vec<f64> =
+            times.filter(|(passage, _)| passage.touches().is_some()).map(|(_, turns)| *turns).collect();
+        let last = 0.5 * f64::from(half_periods);
+        let mut expected =
+            self.passages.iter().zip(&solution.ends).filter(|(passage, _)| passage.touches().is_none());
+        let mut next = expected.next();
+        for passage in &passages {
+            if next.is_some_and(|(other, end)| other.is_like(passage) && is_near(passage, end)) {
+                next = expected.next();
+            } else if !touches.iter().any(|turns| (turns - passage.turns).abs() <= BESIDE) {
+                return false;
+            }
+        }
+        next.is_none() && touches.iter().all(|turns| (-BESIDE..=last + BESIDE).contains(turns))
     }
 
     /// Returns the sequence of flights, and its approximate solution, without an event at a graze: without an impact, or without the beginning
-    /// and the end of a contact. `nth`: the place among all events.
-    fn without(&self, nth: usize, solution: &Solution) -> Option<(Itinerary, Solution)> {
+    /// and the end of a contact. `nth`: the place among all events. With `touches`, the motion touches there.
+    fn without(&self, nth: usize, solution: &Solution, touches: bool) -> Option<(Itinerary, Solution)> {
         let mut places = self.passages.iter().enumerate().filter(|(_, passage)| passage.is_event());
-        let (at, _) = places.nth(nth)?;
+        let (at, event) = places.nth(nth)?;
         let is_back = |count: &usize| {
             let next = self.passages.get(at + count);
             next.is_some_and(|next| next.has_modes_of(&self.passages[at]))
@@ -184,7 +216,55 @@ impl Itinerary {
         shorter.passages.drain(left_out.clone());
         seed.ends.drain(left_out.clone());
         seed.turns.drain(left_out);
+        if touches {
+            shorter.insert(&mut seed, &event.touching()?, (&solution.ends[at], solution.turns[at]))?;
+        }
         Some((shorter, seed))
+    }
+
+    /// Inserts a touch into the flight at its time; none if this flight has other modes.
+    fn insert(
+        &mut self,
+        solution: &mut Solution,
+        touch: &Passage,
+        (state, turns): (&DVector<f64>, f64),
+    ) -> Option<()> {
+        let length = self.passages.last()?.turns;
+        let turns = if self.mirrored { turns } else { turns.rem_euclid(length) };
+        let at = solution.turns.iter().position(|end| turns <= *end).unwrap_or(self.passages.len() - 1);
+        let has_modes = |at: &usize| self.passages.get(*at).is_some_and(|flight| flight.has_modes_of(touch));
+        let at = [at, at.wrapping_sub(1), at + 1].into_iter().find(has_modes)?;
+        self.passages.insert(at, touch.at(turns));
+        solution.ends.insert(at, state.clone());
+        solution.turns.insert(at, turns);
+        Some(())
+    }
+
+    /// Returns another sequence of flights with the touches of this one.
+    fn touching(&self, solution: &Solution, other: (Itinerary, Solution)) -> Option<(Itinerary, Solution)> {
+        let (mut next, mut seed) = other;
+        for (i, passage) in self.passages.iter().enumerate() {
+            if passage.touches().is_some() {
+                next.insert(&mut seed, passage, (&solution.ends[i], solution.turns[i]))?;
+            }
+        }
+        Some((next, seed))
+    }
+
+    /// Returns the sequence of flights with a touch where the motion along an approximate solution first has another event.
+    fn with_next_touch(&self, model: &dyn Model, solution: &Solution) -> Option<(Itinerary, Solution)> {
+        let (run, seed) = {
+            let system = System::new(&model.oscillator().ok()?);
+            let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
+            let passages = motion.passages(self.half_periods(&system)).ok()?;
+            let ends = passages.iter().map(|passage| in_blocks(&passage.state, system.degrees()));
+            (ends.collect::<Vec<_>>(), passages)
+        };
+        let at = seed.iter().zip(&self.passages).position(|(a, b)| !a.is_like(b))?;
+        let touch = seed[at].touching().filter(|_| seed[at].has_modes_of(&self.passages[at]))?;
+        let (mut longer, mut start) = (self.clone(), solution.clone());
+        longer.insert(&mut start, &touch, (&run[at], seed[at].turns))?;
+        Some((longer, start))
     }
 
     /// Returns the states after the first event and before the last one if they are so near to phase 0 that they may pass it.
@@ -198,7 +278,12 @@ impl Itinerary {
             .filter(|&last| length - solution.turns[last] < BESIDE);
         after
             .into_iter()
-            .chain(last.map(|last| solution.ends[last].clone()))
+            // The second half of a cycle that is its own mirror image has the opposite sign.
+            .chain(
+                last.map(
+                    |last| if self.mirrored { -&solution.ends[last] } else { solution.ends[last].clone() },
+                ),
+            )
             .map(|start| in_pairs(&start))
             .collect()
     }
@@ -213,6 +298,22 @@ impl Itinerary {
         (twice, both)
     }
 
+    /// Whether the cycle is a shorter one that is followed twice, or its own mirror image.
+    fn repeats(&self, model: &dyn Model, solution: &Solution) -> bool {
+        let (Ok(oscillator), Ok(scales)) = (model.oscillator(), self.scales(model, solution, &[])) else {
+            return false;
+        };
+        let system = System::new(&oscillator);
+        let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
+        let halves = self.half_periods(&system);
+        let Ok(half) = motion.passages(halves / 2) else { return false };
+        let Some(last) = half.last() else { return false };
+        let sign = if halves.is_multiple_of(4) { 1.0 } else { -1.0 };
+        let end = equations::jumped(&system, last, &in_blocks(&last.state, system.degrees()));
+        let apart = end * sign - &solution.start;
+        !self.mirrored && apart.iter().zip(&scales).all(|(x, scale)| x.abs() <= SAME * scale)
+    }
+
     /// Returns the number of events.
     pub fn events(&self) -> usize {
         self.passages.iter().filter(|passage| passage.is_event()).count()
@@ -225,7 +326,7 @@ impl Itinerary {
     pub fn solve(&self, model: &dyn Model, from: &Solution) -> Result<Solution, CycleError> {
         let free = own(model)?;
         let scales = self.scales(model, from, &free)?;
-        let extra = |linearised: &Linearised, _: &Solution| phase(linearised, &free);
+        let extra = |_: &Laws, linearised: &Linearised, _: &Solution| Ok(phase(linearised, &free));
         Ok(self.newton(model, from.clone(), &free, &scales, &extra)?.0)
     }
 
@@ -236,22 +337,26 @@ impl Itinerary {
         mut at: Solution,
         free: &[Free],
         scales: &[f64],
-        extra: &dyn Fn(&Linearised, &Solution) -> Vec<Extra>,
+        extra: &Extras<'_>,
     ) -> Result<(Solution, usize), CycleError> {
         let mut before = f64::INFINITY;
         for count in 1.. {
-            let linearised = self.linearise(&*placed(model, free, &at.values), &at, free)?;
-            let (matrix, residual) = linearised.with(&extra(&linearised, &at));
+            let laws = Laws::new(&*placed(model, free, &at.values), free, Slopes::Fast)?;
+            let linearised = self.linearise(&laws, &at)?;
+            let (matrix, residual) = linearised.with(&extra(&laws, &linearised, &at)?);
             let step = solve_scaled(&matrix, &-residual, scales).ok_or(CycleError::Diverges)?;
             let length =
                 step.iter().zip(scales).fold(0.0, |most: f64, (x, scale)| most.max((x / scale).abs()));
-            if length.is_nan() || length > LONGEST {
+            let grows = length > STAGNANT && length > GROWS * before;
+            if length.is_nan() || length > LONGEST || grows {
                 return Err(CycleError::Diverges);
             }
             linearised.change(&mut at, self, &step);
             // Near singular equations, steps become rounding errors earlier: they do not shrink.
             let stagnates = length <= STAGNANT && length > SHRINKS * before;
-            if length <= CONVERGED || stagnates {
+            // The next step is shorter at least by the ratio of the last two.
+            let next = if count == 1 { length } else { length * length / before };
+            if length.min(next) <= CONVERGED || stagnates {
                 return Ok((at, count));
             }
             if count == MOST_STEPS {
@@ -280,7 +385,8 @@ impl Itinerary {
     /// [`CycleError`] if the model is not valid, or a flight is too stiff.
     pub fn monodromy(&self, model: &dyn Model, at: &Solution) -> Result<DMatrix<f64>, CycleError> {
         let free = own(model)?;
-        Ok(self.linearise(&*placed(model, &free, &at.values), at, &[])?.monodromy)
+        let laws = Laws::new(&*placed(model, &free, &at.values), &[], Slopes::Fast)?;
+        Ok(self.linearise(&laws, at)?.monodromy)
     }
 
     /// Returns the derivatives of the state at phase 0 and of the times of all ends, in forcing periods, by parameters: one column for each.
@@ -296,7 +402,8 @@ impl Itinerary {
         let own = own(model)?;
         let free: Vec<Free> =
             own.iter().copied().chain(parameters.iter().map(|&index| Free::Parameter(index))).collect();
-        let linearised = self.linearise(&*placed(model, &own, &at.values), at, &free)?;
+        let laws = Laws::new(&*placed(model, &own, &at.values), &free, Slopes::Exact)?;
+        let linearised = self.linearise(&laws, at)?;
         let (matrix, _) = linearised.with(&phase(&linearised, &own));
         let all = matrix.nrows();
         let scales = self.scales(model, at, &own)?;
@@ -369,6 +476,17 @@ impl Solution {
         let all: Vec<f64> =
             self.start.iter().chain(events.map(|(_, turns)| turns)).chain(&self.values).copied().collect();
         DVector::from_vec(all)
+    }
+
+    /// Returns the solution at a share of the way to another one of the same sequence of flights.
+    fn between(&self, other: &Solution, share: f64) -> Solution {
+        let along = |a: &DVector<f64>, b: &DVector<f64>| a + (b - a) * share;
+        Solution {
+            start: along(&self.start, &other.start),
+            ends: self.ends.iter().zip(&other.ends).map(|(a, b)| along(a, b)).collect(),
+            turns: self.turns.iter().zip(&other.turns).map(|(a, b)| a + (b - a) * share).collect(),
+            values: along(&self.values, &other.values),
+        }
     }
 
     /// Returns the times of the ends of all flights since phase 0, in forcing periods.

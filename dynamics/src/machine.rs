@@ -43,7 +43,7 @@ pub use impact::LOWEST_FLIGHT;
 pub(crate) use motion::CarriedModes;
 pub use motion::{MachineMotion, TIE};
 pub use outputs::{Outputs, Situation};
-pub use passages::Passage;
+pub use passages::{Passage, Touched};
 pub use table::{Equations, StartModes};
 
 use crate::model::{MOST_COORDINATES_AND_HARMONICS, STATE, State};

@@ -184,7 +184,8 @@ impl Branches {
             }
             if let Some((part, point)) = arm.last().and_then(|part| Some((part, part.points.last()?))) {
                 let reason = match &part.end {
-                    BranchEnd::Range | BranchEnd::Closed => None,
+                    BranchEnd::Range | BranchEnd::Closed | BranchEnd::Curve => None,
+                    BranchEnd::TurnsBack => Some("it goes back along itself".to_owned()),
                     BranchEnd::Border => {
                         Some("no cycle goes on where its sequence of flights changes".to_owned())
                     }

@@ -161,6 +161,6 @@ fn the_cycles_that_leave_a_pitchfork_are_followed_to_their_graze() {
         let special: Vec<_> =
             arm.iter().flat_map(|part| &part.special).map(|at| (at.kind, at.at.value)).collect();
         let (kind, at) = special[0];
-        assert!(kind == Special::Border && (at - 0.60521).abs() < 5e-6, "{special:?}");
+        assert!(kind == Special::Grazing && (at - 0.60521).abs() < 5e-6, "{special:?}");
     }
 }

@@ -4,23 +4,33 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
+use super::curve::{Condition, Seed};
 use super::equations::Linearised;
-use super::{CycleError, Free, Itinerary, Solution, own, phase, placed, solve_scaled};
+use super::family::{Laws, Slopes};
+use super::{CycleError, Extra, Free, Itinerary, Solution, own, phase, placed, solve_scaled};
 use crate::machine::System;
 use crate::model::Model;
 use crate::stability::multipliers;
 use crate::word::Word;
 
-/// Largest number of Newton steps after which steps of the branch become longer.
-const FEW_STEPS: usize = 4;
+/// Largest number of Newton steps after which steps of the branch become longer, and after which its point may be on another branch.
+const FEW_STEPS: usize = 5;
+const MOST_EASY_STEPS: usize = 7;
 
 /// Cosine of the angle between two tangents above which steps become longer, and below which they are repeated at half the length.
-const STRAIGHT: f64 = 0.995;
+const STRAIGHT: f64 = 0.99;
 const BENT: f64 = 0.9;
 
 /// Largest number of steps of a search for a special point, and its accuracy relative to the scales of the unknowns.
 const MOST_HALVINGS: usize = 60;
 const LOCATED: f64 = 1e-13;
+
+/// Accuracy of a special point from which a curve is followed, and of a change of the sequence of flights that no curve explains.
+const ROUGHLY_LOCATED: f64 = 1e-5;
+const ROUGH_BORDER: f64 = 1e-5;
+
+/// Largest distance of a graze from the last point before it, relative to the parameter's range, beyond that of the first point behind it.
+const BESIDE_TOUCH: f64 = 1e-4;
 
 /// Largest number of points in a row at which a search finds no cycle.
 const MOST_FAILURES: u32 = 4;
@@ -35,8 +45,9 @@ const BESIDE_START: f64 = 1e-6;
 /// Least number of points of a branch that comes back to where it began.
 const LEAST_LOOP: usize = 10;
 
-/// Largest number of parts of a branch.
+/// Largest number of parts of a branch, and of one that leads to a curve.
 const MOST_PARTS: usize = 64;
+const FEW_PARTS: usize = 6;
 
 /// Differences of the parameter, relative to its range, at which a branch goes on beyond a change of its sequence of flights.
 const BEYOND: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
@@ -51,6 +62,8 @@ pub struct BranchLimits<'h> {
     pub steps: [f64; 3],
     /// Largest number of points of a part.
     pub points: usize,
+    /// Whether the branch ends at its first special point that a curve crosses. It is located roughly: the curve's equations are exact.
+    pub to_curve: bool,
     /// The branch ends when this is raised.
     pub halt: &'h AtomicBool,
 }
@@ -58,7 +71,7 @@ pub struct BranchLimits<'h> {
 impl<'h> BranchLimits<'h> {
     /// Returns limits for branches over the whole range of a parameter.
     pub fn new(halt: &'h AtomicBool) -> BranchLimits<'h> {
-        BranchLimits { steps: [1e-3, 1e-9, 2e-2], points: 2000, halt }
+        BranchLimits { steps: [1e-3, 1e-9, 2e-2], points: 2000, to_curve: false, halt }
     }
 }
 
@@ -73,8 +86,10 @@ pub struct BranchPoint {
     pub multipliers: Vec<[f64; 2]>,
     /// Length of the branch from its start.
     pub arclength: f64,
+    /// Place of the multiplier that a curve keeps at 1 or -1.
+    critical: Option<usize>,
     /// Unit tangent in scaled unknowns.
-    tangent: DVector<f64>,
+    pub(super) tangent: DVector<f64>,
     /// Rates at which the function of each event falls.
     approaches: Vec<f64>,
 }
@@ -88,9 +103,9 @@ pub enum Special {
     Flip,
     /// A multiplier is 1, and another branch crosses: of cycles that are not their own mirror images, for example.
     Pitchfork,
-    /// An event disappears: its function only touches 0.
+    /// An event disappears or begins: its function only touches 0.
     Grazing,
-    /// A new event begins, or the sequence of flights changes in another way.
+    /// The sequence of flights changes in another way.
     Border,
 }
 
@@ -101,6 +116,8 @@ pub struct SpecialPoint {
     pub kind: Special,
     /// The cycle.
     pub at: BranchPoint,
+    /// The cycle at a graze, as one that touches without an event; none if it is not known, and on curves.
+    pub(super) touch: Option<(Itinerary, Solution)>,
 }
 
 /// Why a branch ends.
@@ -114,8 +131,12 @@ pub enum BranchEnd {
     Failed(CycleError),
     /// The branch comes back to where it began.
     Closed,
+    /// The branch goes back along itself: the equations are degenerate where it turned.
+    TurnsBack,
     /// The number of points is at its limit.
     Points,
+    /// A curve crosses the branch.
+    Curve,
     /// The computation was halted.
     Halted,
 }
@@ -135,13 +156,25 @@ pub struct Branch {
     pub end: BranchEnd,
 }
 
+impl Branch {
+    /// Returns the length of the part.
+    pub fn length(&self) -> f64 {
+        self.points.last().map_or(0.0, |point| point.arclength)
+    }
+}
+
 /// What stays the same along a branch.
-struct Along<'a> {
-    model: &'a dyn Model,
-    itinerary: &'a Itinerary,
-    free: Vec<Free>,
-    scales: Vec<f64>,
-    range: [f64; 2],
+pub(super) struct Along<'a> {
+    pub(super) model: &'a dyn Model,
+    pub(super) itinerary: &'a Itinerary,
+    pub(super) free: Vec<Free>,
+    pub(super) scales: Vec<f64>,
+    /// The last free numbers: parameters and their ranges.
+    pub(super) parameters: Vec<(usize, [f64; 2])>,
+    /// What defines a curve; none on a branch.
+    pub(super) condition: Option<Condition>,
+    /// Accuracy of special points, relative to the scales of the unknowns.
+    accuracy: f64,
 }
 
 /// Follows the branch of a cycle over a parameter within a range, in one direction: towards larger values at first if `rises`.
@@ -158,10 +191,14 @@ pub fn follow(
 ) -> Result<Branch, CycleError> {
     let mut start = itinerary.solve(model, from)?;
     start.values = start.values.push(model.value(parameter));
-    let along = Along::new(model, itinerary, &start, parameter, range)?;
+    let mut along = Along::new(model, itinerary, &start, &[(parameter, range)], None)?;
+    if limits.to_curve {
+        along.accuracy = ROUGHLY_LOCATED;
+    }
     let mut ahead = DVector::zeros(along.scales.len());
     *ahead.as_mut_slice().last_mut().expect("the parameter is an unknown") = if rises { 1.0 } else { -1.0 };
-    along.trace(along.point(start, &ahead, 0.0)?, limits)
+    let word = along.word(&start)?;
+    along.trace(along.point(start, &ahead, 0.0)?, word, limits)
 }
 
 /// Follows the branch that leaves another one at a flip or at a pitchfork, in both directions: at a flip, one of them, because the other has
@@ -178,7 +215,7 @@ pub fn switch(
     limits: &BranchLimits<'_>,
 ) -> Result<Vec<Vec<Branch>>, CycleError> {
     let (itinerary, at, is_flip) = (&part.itinerary, &special.at, special.kind == Special::Flip);
-    let before = Along::new(model, itinerary, &at.solution, parameter, range)?;
+    let before = Along::new(model, itinerary, &at.solution, &[(parameter, range)], None)?;
     let (_, linearised) = before.point(at.solution.clone(), &at.tangent, 0.0)?;
     let size = at.solution.start.len();
     let sign = if is_flip { 1.0 } else { -1.0 };
@@ -196,7 +233,7 @@ pub fn switch(
         (doubled, start) = itinerary.doubled(&at.solution);
         of_events.extend(events.iter().map(|x| -x));
     }
-    let along = Along::new(model, &doubled, &start, parameter, range)?;
+    let along = Along::new(model, &doubled, &start, &[(parameter, range)], None)?;
     let mut ahead = DVector::zeros(along.scales.len());
     let entries = along_start.iter().chain(&of_events);
     ahead.iter_mut().zip(entries).zip(&along.scales).for_each(|((ahead, x), scale)| *ahead = x / scale);
@@ -205,7 +242,8 @@ pub fn switch(
         let mut first = along.point(start.clone(), &ahead, 0.0)?;
         // The equations cannot tell the tangents of the two branches apart.
         first.0.tangent = ahead;
-        let mut first = along.trace(first, limits)?;
+        let word = along.word(&first.0.solution)?;
+        let mut first = along.trace(first, word, limits)?;
         // The branch begins at the special point.
         first.special.retain(|special| special.at.arclength > limits.steps[0]);
         go_on(model, vec![first], parameter, range, limits)
@@ -238,7 +276,8 @@ fn go_on(
     range: [f64; 2],
     limits: &BranchLimits<'_>,
 ) -> Result<Vec<Branch>, CycleError> {
-    while parts.len() < MOST_PARTS
+    let most = if limits.to_curve { FEW_PARTS } else { MOST_PARTS };
+    while parts.len() < most
         && let Some(part) = parts.last()
         && let (BranchEnd::Border, Some(at)) = (&part.end, part.points.last())
         && let Some((next, seed, side)) = successor(model, &part.itinerary, at, parameter, range)
@@ -314,7 +353,7 @@ fn successor(
         let starts = [seed.state()].into_iter().chain(itinerary.beside_strobe(&system, &seed));
         let run = starts.filter_map(|state| Itinerary::of(&*moved, &state, half_periods).ok());
         let grazing = at.approaches.iter().enumerate().min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let shorter = grazing.and_then(|(nth, _)| itinerary.without(nth, &seed));
+        let shorter = grazing.and_then(|(nth, _)| itinerary.without(nth, &seed, false));
         for (next, start) in run.chain(shorter) {
             if !next.is_like(itinerary)
                 && let Ok(solution) = next.solve(&*moved, &start)
@@ -338,47 +377,69 @@ fn fold(point: &BranchPoint) -> f64 {
 /// Returns a function that is 0 where another branch crosses: the product of the distances of all multipliers from 1, divided by the component
 /// of the tangent along the parameter, which is 0 at a fold, too.
 fn pitchfork(point: &BranchPoint) -> f64 {
-    let of = |[re, im]: &[f64; 2]| if *im == 0.0 { re - 1.0 } else { (re - 1.0).hypot(*im) };
-    point.multipliers.iter().map(of).product::<f64>() / fold(point)
+    one(point) / fold(point)
 }
 
-/// Returns the product of the distances of all multipliers from -1.
+/// Returns the product of the distances of the regular multipliers from 1.
+fn one(point: &BranchPoint) -> f64 {
+    let of = |[re, im]: [f64; 2]| if im == 0.0 { re - 1.0 } else { (re - 1.0).hypot(im) };
+    point.regular().map(of).product()
+}
+
+/// Returns the product of the distances of the regular multipliers from -1.
 fn flip(point: &BranchPoint) -> f64 {
-    let of = |[re, im]: &[f64; 2]| if *im == 0.0 { re + 1.0 } else { (re + 1.0).hypot(*im) };
-    point.multipliers.iter().map(of).product()
+    let of = |[re, im]: [f64; 2]| if im == 0.0 { re + 1.0 } else { (re + 1.0).hypot(im) };
+    point.regular().map(of).product()
+}
+
+/// Returns the place of the multiplier that is nearest to a number.
+pub(super) fn nearest(multipliers: &[[f64; 2]], number: f64) -> Option<usize> {
+    let off = |[re, im]: &[f64; 2]| (re - number).hypot(*im);
+    multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1))).map(|(place, _)| place)
 }
 
 impl BranchPoint {
-    /// Whether the cycle is stable: all multipliers lie within the unit circle.
+    /// Returns the multipliers without the one that a curve keeps at 1 or -1.
+    fn regular(&self) -> impl Iterator<Item = [f64; 2]> {
+        let kept = move |(place, _): &(usize, &[f64; 2])| Some(*place) != self.critical;
+        self.multipliers.iter().enumerate().filter(kept).map(|(_, multiplier)| *multiplier)
+    }
+
+    /// Whether the cycle is stable: all multipliers lie within the unit circle, except for the one that a curve keeps at 1 or -1.
     pub fn is_stable(&self) -> bool {
-        self.multipliers.iter().all(|[re, im]| re.hypot(*im) < 1.0)
+        self.regular().all(|[re, im]| re.hypot(im) < 1.0)
     }
 }
 
 impl<'a> Along<'a> {
-    /// `start`: a solution with the value of the parameter as its last free number.
-    fn new(
+    /// `start`: a solution with the values of the parameters as its last free numbers.
+    pub(super) fn new(
         model: &'a dyn Model,
         itinerary: &'a Itinerary,
         start: &Solution,
-        parameter: usize,
-        range: [f64; 2],
+        parameters: &[(usize, [f64; 2])],
+        condition: Option<Condition>,
     ) -> Result<Along<'a>, CycleError> {
         let mut free = own(model)?;
-        free.push(Free::Parameter(parameter));
+        free.extend(parameters.iter().map(|(index, _)| Free::Parameter(*index)));
         let mut scales = itinerary.scales(model, start, &free)?;
-        *scales.last_mut().expect("the parameter is an unknown") = range[1] - range[0];
-        Ok(Along { model, itinerary, free, scales, range })
+        // Lengths do not grow with the number of events.
+        let (size, events) = (start.start.len(), itinerary.events());
+        scales[size..size + events].fill((events as f64).sqrt());
+        let ranges = parameters.iter().rev().map(|(_, [low, high])| high - low);
+        scales.iter_mut().rev().zip(ranges).for_each(|(scale, range)| *scale = range);
+        let (parameters, accuracy) = (parameters.to_vec(), LOCATED);
+        Ok(Along { model, itinerary, free, scales, parameters, condition, accuracy })
     }
 
     /// Follows a branch from a point.
-    fn trace(
+    pub(super) fn trace(
         &self,
         mut now: (BranchPoint, Linearised),
+        word: Word,
         limits: &BranchLimits<'_>,
     ) -> Result<Branch, CycleError> {
-        let (itinerary, word) =
-            (self.itinerary.clone(), self.itinerary.word(self.model_at(&now.0).as_ref(), &now.0.solution)?);
+        let itinerary = self.itinerary.clone();
         let (points, special) = (vec![now.0.clone()], Vec::new());
         let mut branch = Branch { itinerary, word, points, special, end: BranchEnd::Points };
         let [mut length, least, largest] = limits.steps;
@@ -389,13 +450,17 @@ impl<'a> Along<'a> {
             }
             let cosine = |next: &BranchPoint| now.0.tangent.dot(&next.tangent);
             let next = match self.next(&now, length) {
-                Ok((next, count)) if cosine(&next.0) >= BENT || length <= least => {
+                Ok((next, count))
+                    if (cosine(&next.0) >= BENT && count <= MOST_EASY_STEPS) || length <= least =>
+                {
                     let is_easy = cosine(&next.0) > STRAIGHT && count <= FEW_STEPS;
                     length = if is_easy { largest.min(1.5 * length) } else { length };
                     next
                 }
                 Err(error) if length <= least => {
-                    branch.end = BranchEnd::Failed(error);
+                    // The model may not allow values beyond the range.
+                    let is_at_end = matches!(error, CycleError::Model(_)) && self.is_beside_end(&now.0);
+                    branch.end = if is_at_end { BranchEnd::Range } else { BranchEnd::Failed(error) };
                     break;
                 }
                 _ => {
@@ -404,22 +469,31 @@ impl<'a> Along<'a> {
                 }
             };
             let border = self.border(&now, &next.0);
-            branch.special.extend(self.special(&now, &next.0, border.as_ref().map(|(_, at)| at.arclength)));
-            if let Some((kind, at)) = border {
-                branch.points.push(at.clone());
-                branch.special.push(SpecialPoint { kind, at });
+            branch.special.extend(self.special(&now, border.as_ref().map_or(&next.0, |border| &border.at)));
+            if let Some(border) = border {
+                branch.points.push(border.at.clone());
+                branch.special.push(border);
                 branch.end = BranchEnd::Border;
+            }
+            if limits.to_curve && branch.special.iter().any(|special| Seed::of(&branch, special).is_some()) {
+                branch.end = BranchEnd::Curve;
+            }
+            if matches!(branch.end, BranchEnd::Border | BranchEnd::Curve) {
                 break;
             }
             if let Some(end) = self.end_of_range(&next.0) {
-                let at_end = |point: &BranchPoint| point.value - end;
+                let (number, end) = end;
+                let at_end = |point: &BranchPoint| point.solution.values[number] - end;
                 branch.points.extend(self.locate(&now, &next.0, &at_end));
                 branch.end = BranchEnd::Range;
                 break;
             }
             branch.points.push(next.0.clone());
-            if branch.points.len() > LEAST_LOOP && self.distance(&next.0, &branch.points[0]) < length {
-                branch.end = BranchEnd::Closed;
+            if branch.points.len() > LEAST_LOOP
+                && self.distance(&next.0.solution, &branch.points[0].solution) < length
+            {
+                let same_way = next.0.tangent.dot(&branch.points[0].tangent) > 0.0;
+                branch.end = if same_way { BranchEnd::Closed } else { BranchEnd::TurnsBack };
                 break;
             }
             now = next;
@@ -428,73 +502,150 @@ impl<'a> Along<'a> {
     }
 
     /// Returns the distance of two cycles in scaled unknowns.
-    fn distance(&self, a: &BranchPoint, b: &BranchPoint) -> f64 {
-        let apart = a.solution.unknowns(self.itinerary) - b.solution.unknowns(self.itinerary);
+    pub(super) fn distance(&self, a: &Solution, b: &Solution) -> f64 {
+        let apart = a.unknowns(self.itinerary) - b.unknowns(self.itinerary);
         apart.iter().zip(&self.scales).map(|(x, scale)| (x / scale).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Returns the end of the parameter's range beyond which a point lies.
-    fn end_of_range(&self, point: &BranchPoint) -> Option<f64> {
-        let [low, high] = self.range;
-        if point.value < low { Some(low) } else { (point.value > high).then_some(high) }
+    /// Returns a free number that is out of its range at a point, and the end beyond which it lies.
+    pub(super) fn end_of_range(&self, point: &BranchPoint) -> Option<(usize, f64)> {
+        let first = self.free.len() - self.parameters.len();
+        self.parameters.iter().enumerate().find_map(|(i, (_, [low, high]))| {
+            let value = point.solution.values[first + i];
+            let end = if value < *low { Some(*low) } else { (value > *high).then_some(*high) };
+            Some((first + i, end?))
+        })
+    }
+
+    /// Whether a parameter is almost at an end of its range.
+    fn is_beside_end(&self, point: &BranchPoint) -> bool {
+        let values = point.solution.values.iter().rev().zip(self.parameters.iter().rev());
+        values
+            .into_iter()
+            .any(|(value, (_, [low, high]))| (value - low).min(high - value) <= BESIDE_START * (high - low))
     }
 
     /// Returns where the sequence of flights changes between two points.
-    fn border(&self, now: &(BranchPoint, Linearised), next: &BranchPoint) -> Option<(Special, BranchPoint)> {
+    fn border(&self, now: &(BranchPoint, Linearised), next: &BranchPoint) -> Option<SpecialPoint> {
         let grazing = (0..next.approaches.len())
-            .filter_map(|event| self.locate(now, next, &|point| point.approaches[event]))
-            .min_by(|a, b| a.arclength.total_cmp(&b.arclength))
-            .map(|at| (Special::Grazing, at));
-        let border =
-            || (!self.is_admissible(next)).then(|| (Special::Border, self.last_admissible(now, next)));
-        grazing.or_else(border).filter(|(_, at)| self.end_of_range(at).is_none())
+            .filter_map(|event| {
+                let at = self.locate(now, next, &|point| point.approaches[event])?;
+                let touch = self.itinerary.without(event, &at.solution, true);
+                Some(SpecialPoint { kind: Special::Grazing, at, touch })
+            })
+            .min_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
+        let border = || {
+            if self.is_admissible(next) {
+                return None;
+            }
+            if let Some(at) = self.event_at_strobe(now, next) {
+                return Some(SpecialPoint { kind: Special::Border, at, touch: None });
+            }
+            let at = self.last_admissible(now, next);
+            let touch = self.touch(next, &at);
+            let kind = if touch.is_some() { Special::Grazing } else { Special::Border };
+            Some(SpecialPoint { kind, at, touch })
+        };
+        grazing.or_else(border).filter(|border| self.end_of_range(&border.at).is_none())
     }
 
-    /// Returns folds, flips and pitchforks between two points, up to a given arclength.
-    fn special(
-        &self,
-        now: &(BranchPoint, Linearised),
-        next: &BranchPoint,
-        end: Option<f64>,
-    ) -> Vec<SpecialPoint> {
-        let tests: [(Special, Test, f64); 3] = [
+    /// Returns where an event comes to phase 0.
+    fn event_at_strobe(&self, now: &(BranchPoint, Linearised), next: &BranchPoint) -> Option<BranchPoint> {
+        let passages = &self.itinerary.passages;
+        let length = passages.last().map_or(0.0, |last| last.turns);
+        let found = (0..passages.len()).filter(|i| passages[*i].is_event()).flat_map(|i| {
+            let test = move |end: f64| move |point: &BranchPoint| point.solution.turns[i] - end;
+            [0.0, length].into_iter().filter_map(move |end| self.locate(now, next, &test(end)))
+        });
+        found.min_by(|a, b| a.arclength.total_cmp(&b.arclength)).filter(|at| self.is_admissible(at))
+    }
+
+    /// Returns the cycle that touches what the motion of the first cycle that is not admissible reaches.
+    fn touch(&self, beyond: &BranchPoint, last: &BranchPoint) -> Option<(Itinerary, Solution)> {
+        if self.condition.is_some() {
+            return None;
+        }
+        let model = self.model_at(beyond);
+        let (itinerary, seed) = self.itinerary.with_next_touch(&*model, &beyond.solution)?;
+        let scales = itinerary.scales(self.model, &seed, &self.free).ok()?;
+        let extra = |_: &Laws, linearised: &Linearised, _: &Solution| {
+            Ok(phase(linearised, &self.free).into_iter().chain(linearised.touches.clone()).collect())
+        };
+        let (solution, _) = itinerary.newton(self.model, seed, &self.free, &scales, &extra).ok()?;
+        // Another graze is not the reason why the sequence changes here.
+        let (value, [low, high]) = (solution.values[solution.values.len() - 1], self.parameters[0].1);
+        if (value - last.value).abs() > (beyond.value - last.value).abs() + BESIDE_TOUCH * (high - low) {
+            return None;
+        }
+        itinerary
+            .is_followed(&*placed(self.model, &self.free, &solution.values), &solution)
+            .then_some((itinerary, solution))
+    }
+
+    /// Returns folds, flips and pitchforks between two points.
+    fn special(&self, now: &(BranchPoint, Linearised), next: &BranchPoint) -> Vec<SpecialPoint> {
+        let at_flip = AT_FLIP.max(1e3 * self.accuracy);
+        let on_branch: [(Special, Test, f64); 3] = [
             (Special::Fold, fold, f64::INFINITY),
             // A multiplier that passes infinity at a graze changes the sign of the products, too.
-            (Special::Flip, flip, AT_FLIP),
-            (Special::Pitchfork, pitchfork, AT_FLIP),
+            (Special::Flip, flip, at_flip),
+            (Special::Pitchfork, pitchfork, at_flip),
         ];
+        let on_curve: [(Special, Test, f64); 2] =
+            [(Special::Fold, one, at_flip), (Special::Flip, flip, at_flip)];
+        let tests = if self.condition.is_some() { &on_curve[..] } else { &on_branch };
         let mut found = Vec::new();
-        for (kind, test, most) in tests {
+        for &(kind, test, most) in tests {
             // Products that are rounding errors belong to families of cycles.
-            let is_clear = kind == Special::Fold || test(&now.0).abs().min(test(next).abs()) > LEAST_PRODUCT;
+            let is_clear = most.is_infinite() || test(&now.0).abs().min(test(next).abs()) > LEAST_PRODUCT;
             let at = is_clear.then(|| self.locate(now, next, &test)).flatten();
             let is_there = |at: &BranchPoint| {
                 self.end_of_range(at).is_none()
+                    // There the branch only meets the one that it has left.
+                    && !(kind == Special::Fold && self.itinerary.repeats(&*self.model_at(at), &at.solution))
                     && test(at).abs() <= most
-                    && end.is_none_or(|end| at.arclength < end)
             };
-            found.extend(at.filter(is_there).map(|at| SpecialPoint { kind, at }));
+            found.extend(at.filter(is_there).map(|at| SpecialPoint { kind, at, touch: None }));
         }
         found.sort_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
         found
+    }
+
+    fn word(&self, solution: &Solution) -> Result<Word, CycleError> {
+        self.itinerary.word(&*placed(self.model, &self.free, &solution.values), solution)
     }
 
     fn model_at(&self, point: &BranchPoint) -> Box<dyn Model> {
         placed(self.model, &self.free, &point.solution.values)
     }
 
+    /// Returns the equations of the phase and of the condition.
+    pub(super) fn conditions(
+        &self,
+        laws: &Laws,
+        linearised: &Linearised,
+        at: &Solution,
+    ) -> Result<Vec<Extra>, CycleError> {
+        let mut all = phase(linearised, &self.free);
+        if let Some(condition) = self.condition {
+            all.extend(condition.equations(self, laws, linearised, at)?);
+        }
+        Ok(all)
+    }
+
     /// Completes a solution to a point whose tangent continues an earlier one.
-    fn point(
+    pub(super) fn point(
         &self,
         solution: Solution,
         before: &DVector<f64>,
         arclength: f64,
     ) -> Result<(BranchPoint, Linearised), CycleError> {
         let model = placed(self.model, &self.free, &solution.values);
-        let linearised = self.itinerary.linearise(&*model, &solution, &self.free)?;
+        let laws = Laws::new(&*model, &self.free, Slopes::Fast)?;
+        let linearised = self.itinerary.linearise(&laws, &solution)?;
         let count = before.len();
         let row = RowDVector::from_fn(count, |_, j| before[j] / self.scales[j]);
-        let mut extra = phase(&linearised, &self.free);
+        let mut extra = self.conditions(&laws, &linearised, &solution)?;
         extra.push((row, 0.0));
         let (matrix, mut right) = linearised.with(&extra);
         right.fill(0.0);
@@ -504,13 +655,13 @@ impl<'a> Along<'a> {
         let mut multipliers = multipliers(&linearised.monodromy).ok_or(CycleError::Diverges)?;
         if self.free.contains(&Free::CycleTime) {
             // The choice of phase 0 on a cycle without force has the multiplier 1.
-            let off = |[re, im]: &[f64; 2]| (re - 1.0).hypot(*im);
-            let nearest = multipliers.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
-            nearest.map(|(place, _)| place).map(|place| multipliers.remove(place));
+            nearest(&multipliers, 1.0).map(|place| multipliers.remove(place));
         }
+        let critical = self.condition.and_then(|condition| condition.critical(&multipliers));
         let value = solution.values[solution.values.len() - 1];
         let approaches = linearised.approaches.clone();
-        Ok((BranchPoint { solution, value, multipliers, arclength, tangent, approaches }, linearised))
+        let point = BranchPoint { solution, value, multipliers, arclength, critical, tangent, approaches };
+        Ok((point, linearised))
     }
 
     /// Returns the point at a distance along the tangent, and the number of Newton steps.
@@ -523,13 +674,23 @@ impl<'a> Along<'a> {
         let scaled = |j: usize| from.tangent[j] * self.scales[j];
         let step = DVector::from_fn(from.tangent.len(), |j, _| scaled(j) * length);
         linearised.change(&mut predicted, self.itinerary, &step);
+        self.correct(from, predicted, length)
+    }
+
+    /// Returns the point across the tangent of an earlier one from a prediction, and the number of Newton steps.
+    fn correct(
+        &self,
+        from: &BranchPoint,
+        predicted: Solution,
+        length: f64,
+    ) -> Result<((BranchPoint, Linearised), usize), CycleError> {
         let centre = predicted.unknowns(self.itinerary);
-        let row = RowDVector::from_fn(step.len(), |_, j| from.tangent[j] / self.scales[j]);
-        let extra = |linearised: &Linearised, at: &Solution| {
+        let row = RowDVector::from_fn(centre.len(), |_, j| from.tangent[j] / self.scales[j]);
+        let extra = |laws: &Laws, linearised: &Linearised, at: &Solution| {
             let ahead = &row * (at.unknowns(self.itinerary) - &centre);
-            let mut all = phase(linearised, &self.free);
+            let mut all = self.conditions(laws, linearised, at)?;
             all.push((row.clone(), ahead[0]));
-            all
+            Ok(all)
         };
         let (solution, count) =
             self.itinerary.newton(self.model, predicted, &self.free, &self.scales, &extra)?;
@@ -537,7 +698,7 @@ impl<'a> Along<'a> {
     }
 
     /// Whether the motion along the cycle has the cycle's sequence of flights.
-    fn is_admissible(&self, point: &BranchPoint) -> bool {
+    pub(super) fn is_admissible(&self, point: &BranchPoint) -> bool {
         self.itinerary.is_followed(&*self.model_at(point), &point.solution)
     }
 
@@ -549,7 +710,8 @@ impl<'a> Along<'a> {
         test: &dyn Fn(&BranchPoint) -> f64,
     ) -> Option<BranchPoint> {
         let length = to.arclength - from.0.arclength;
-        let (mut low, mut high) = ((0.0, test(&from.0)), (length, test(to)));
+        let (mut low, mut high) =
+            ((0.0, test(&from.0), from.0.solution.clone()), (length, test(to), to.solution.clone()));
         let mut found = None;
         let (opposite, mut failures) = (low.1 * high.1 < 0.0, 0);
         for nth in (0..MOST_HALVINGS).take_while(|_| opposite) {
@@ -559,8 +721,10 @@ impl<'a> Along<'a> {
                 0 => low.1 / (low.1 - high.1),
                 _ => 0.5 + 0.1 * f64::from(failures),
             };
-            let middle = low.0 + share.clamp(1e-3, 1.0 - 1e-3) * (high.0 - low.0);
-            let Ok(((point, _), _)) = self.next(from, middle) else {
+            let share = share.clamp(1e-3, 1.0 - 1e-3);
+            let middle = low.0 + share * (high.0 - low.0);
+            let predicted = low.2.between(&high.2, share);
+            let Ok(((point, _), _)) = self.correct(&from.0, predicted, middle) else {
                 failures += 1;
                 if failures > MOST_FAILURES {
                     break;
@@ -569,28 +733,35 @@ impl<'a> Along<'a> {
             };
             let value = test(&point);
             if value * low.1 > 0.0 {
-                low = (middle, value)
+                low = (middle, value, point.solution.clone());
             } else {
-                high = (middle, value)
+                high = (middle, value, point.solution.clone());
             }
-            (found, failures) = (Some(point), 0);
-            if value == 0.0 || high.0 - low.0 <= LOCATED {
+            failures = 0;
+            if found.as_ref().is_none_or(|(best, _): &(f64, BranchPoint)| value.abs() <= *best) {
+                found = Some((value.abs(), point));
+            }
+            if value == 0.0 || high.0 - low.0 <= self.accuracy {
                 break;
             }
         }
-        found
+        found.map(|(_, point)| point)
     }
 
     /// Returns the last point at which the cycle is admissible between two points, by bisection.
     fn last_admissible(&self, from: &(BranchPoint, Linearised), to: &BranchPoint) -> BranchPoint {
         let (mut low, mut high, mut found) = (0.0, to.arclength - from.0.arclength, from.0.clone());
+        let mut end = to.solution.clone();
+        let is_rough = self.accuracy > LOCATED || self.condition.is_some();
+        let accuracy = if is_rough { ROUGH_BORDER } else { LOCATED };
         for _ in 0..MOST_HALVINGS {
             let middle = 0.5 * (low + high);
-            match self.next(from, middle) {
+            match self.correct(&from.0, found.solution.between(&end, 0.5), middle) {
                 Ok(((point, _), _)) if self.is_admissible(&point) => (low, found) = (middle, point),
-                _ => high = middle,
+                Ok(((point, _), _)) => (high, end) = (middle, point.solution),
+                Err(_) => high = middle,
             }
-            if high - low <= LOCATED {
+            if high - low <= accuracy {
                 break;
             }
         }

@@ -2,17 +2,17 @@
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-use super::family::{Free, Laws};
+use super::family::Laws;
 use super::flight::{Equations, Flight, drift, point};
 use super::{CycleError, Extra, Itinerary, Solution};
 use crate::machine::{Passage, System};
-use crate::model::Model;
 
 /// Relative change of a state for derivatives of the duration of a series of impacts, which is a smooth function of it.
 const DIFFERENCE: f64 = 1e-5;
 
 /// The equations of a cycle at approximate values of the unknowns, and their derivatives. The unknowns are the state at phase 0, the times of
 /// events, and free numbers.
+#[derive(Clone)]
 pub(super) struct Linearised {
     /// Residuals of closure, then of the conditions of events.
     pub(super) residual: DVector<f64>,
@@ -24,6 +24,8 @@ pub(super) struct Linearised {
     pub(super) rates: DVector<f64>,
     /// Rates of change, per turn, of the function of each event. They are 0 where the event is at a graze.
     pub(super) approaches: Vec<f64>,
+    /// For each touch, this rate and its derivatives by all unknowns.
+    pub(super) touches: Vec<Extra>,
     /// Derivatives of the states before each end by all unknowns, and the changes of these states that make all flights fit.
     ends: Vec<DMatrix<f64>>,
     misfits: Vec<DVector<f64>>,
@@ -66,6 +68,30 @@ impl Carried {
     }
 }
 
+/// The equations of flights and their derivatives by free numbers, computed once for all flights in the same modes.
+#[derive(Default)]
+struct EquationsByModes(Vec<(usize, Equations, Vec<Equations>)>);
+
+impl EquationsByModes {
+    /// Returns the equations of the flight with this place.
+    fn of(&mut self, laws: &Laws, passages: &[Passage], place: usize) -> (&Equations, &[Equations]) {
+        let has_modes = |(other, ..): &(usize, _, _)| passages[*other].has_modes_of(&passages[place]);
+        let at = self.0.iter().position(has_modes).unwrap_or_else(|| {
+            let accelerations = |system: &System| system.accelerations(&passages[place]) * system.period();
+            let of_flight =
+                Equations { period: laws.system.period(), accelerations: accelerations(&laws.system) };
+            let by_free = |j: usize| {
+                let period = laws.slope(j, |system| system.period());
+                Equations { period, accelerations: laws.slope(j, accelerations) }
+            };
+            self.0.push((place, of_flight, (0..laws.free()).map(by_free).collect()));
+            self.0.len() - 1
+        });
+        let (_, of_flight, by_parameter) = &self.0[at];
+        (of_flight, by_parameter)
+    }
+}
+
 /// Returns the state after the jumps of a passage.
 pub(super) fn jumped(system: &System, passage: &Passage, before: &DVector<f64>) -> DVector<f64> {
     let (n, mut state) = (before.len() / 2, before.clone());
@@ -78,17 +104,11 @@ pub(super) fn jumped(system: &System, passage: &Passage, before: &DVector<f64>) 
 }
 
 impl Itinerary {
-    /// Returns the equations and their derivatives by all unknowns, where `free` are the numbers beside states and times.
-    pub(super) fn linearise(
-        &self,
-        model: &dyn Model,
-        at: &Solution,
-        free: &[Free],
-    ) -> Result<Linearised, CycleError> {
-        let laws = Laws::new(model, free)?;
-        let (system, size, events) = (&laws.system, at.start.len(), self.events());
+    /// Returns the equations and their derivatives by all unknowns: states, times, and the free numbers of the laws.
+    pub(super) fn linearise(&self, laws: &Laws, at: &Solution) -> Result<Linearised, CycleError> {
+        let (system, size, events, free) = (&laws.system, at.start.len(), self.events(), laws.free());
         let first_free = size + events;
-        let count = first_free + free.len();
+        let count = first_free + free;
         let mut by = DMatrix::identity(size, count + size);
         by.columns_mut(count, size).fill_with_identity();
         let mut now = Carried { state: at.start.clone(), by, misfit: DVector::zeros(size) };
@@ -98,6 +118,7 @@ impl Itinerary {
             monodromy: DMatrix::zeros(size, size),
             rates: DVector::zeros(size),
             approaches: Vec::new(),
+            touches: Vec::new(),
             ends: Vec::new(),
             misfits: Vec::new(),
             turns: DMatrix::zeros(self.passages.len(), count),
@@ -105,17 +126,12 @@ impl Itinerary {
             known: Vec::new(),
         };
         let (mut turns, mut turns_by, mut equation) = (0.0, RowDVector::zeros(count + size), size);
+        let mut modes = EquationsByModes::default();
         for (i, passage) in self.passages.iter().enumerate() {
-            let accelerations = |system: &System| system.accelerations(passage) * system.period();
-            let of_flight = Equations { period: system.period(), accelerations: accelerations(system) };
-            let by_free = |j: usize| {
-                let period = laws.slope(j, |system| system.period());
-                Equations { period, accelerations: laws.slope(j, accelerations) }
-            };
-            let by_parameter: Vec<Equations> = (0..free.len()).map(by_free).collect();
+            let (of_flight, by_parameter) = modes.of(laws, &self.passages, i);
             let mut flight = Flight {
-                equations: &of_flight,
-                by_parameter: &by_parameter,
+                equations: of_flight,
+                by_parameter,
                 orders: system.orders(),
                 radian: system.radian(passage) / system.period(),
                 turns: [turns, at.turns[i]],
@@ -130,11 +146,11 @@ impl Itinerary {
                         .map_or(f64::NAN, |time| time / system.period())
                 };
                 flight.turns[1] = turns + duration(system, &now.state, turns);
-                end_by = series_by(&laws, passage, &now, (turns, &turns_by), &duration, first_free);
-                now.jump(&laws, passage, first_free);
+                end_by = series_by(laws, passage, &now, (turns, &turns_by), &duration, first_free);
+                now.jump(laws, passage, first_free);
             } else {
                 flight.turns[1] = system.known_turns(passage);
-                (0..free.len()).for_each(|j| {
+                (0..free).for_each(|j| {
                     end_by[first_free + j] = laws.slope(j, |system| system.known_turns(passage))
                 });
             }
@@ -151,6 +167,8 @@ impl Itinerary {
                 let point = point(system.orders(), &at.ends[i], flight.turns[1]);
                 let row_of_state = row.rows(0, size);
                 let rate = row_of_state.dot(&end.rates[1]) + drift(system.orders(), row, &point);
+                // A touch changes nothing, so its time does not matter to what follows.
+                let rate = if passage.touches().is_some() { f64::INFINITY } else { rate };
                 linearised.approaches.push(rate);
                 let later = row_of_state.transpose() * now.by.columns(count, size) / -rate;
                 linearised.later.set_row(equation - size, &later);
@@ -160,22 +178,25 @@ impl Itinerary {
             now.misfit = &end.by_state * &now.misfit + (&end.state - &at.ends[i]);
             now.state = at.ends[i].clone();
             (turns, turns_by) = (flight.turns[1], end_by);
-            if let Some(row) = condition {
-                let point = point(system.orders(), &now.state, turns);
-                let mut by = row.rows(0, size).transpose() * &now.by
-                    + &turns_by * drift(system.orders(), &row, &point);
-                let value = |system: &System| system.condition(passage).map_or(0.0, |row| row.dot(&point));
-                (0..free.len()).for_each(|j| by[first_free + j] += laws.slope(j, value));
-                linearised.matrix.set_row(equation, &by.columns(0, count));
-                linearised.residual[equation] = row.dot(&point) + row.rows(0, size).dot(&now.misfit);
+            if passage.is_event() {
+                let (row, value) = functional(laws, &now, (turns, &turns_by), first_free, &|system| {
+                    system.condition(passage)
+                });
+                linearised.matrix.set_row(equation, &row.columns(0, count));
+                linearised.residual[equation] = value;
                 equation += 1;
+            }
+            if passage.touches().is_some() {
+                let (row, value) =
+                    functional(laws, &now, (turns, &turns_by), first_free, &|system| system.rate(passage));
+                linearised.touches.push((row.columns(0, count).into_owned(), value));
             }
             linearised.ends.push(now.by.columns(0, count).into_owned());
             linearised.misfits.push(now.misfit.clone());
             linearised.turns.set_row(i, &turns_by.columns(0, count));
             linearised.known.push(turns);
             if !passage.is_series() {
-                now.jump(&laws, passage, first_free);
+                now.jump(laws, passage, first_free);
             }
         }
         let sign = if self.mirrored { -1.0 } else { 1.0 };
@@ -186,6 +207,24 @@ impl Itinerary {
         (0..size).for_each(|i| linearised.matrix[(i, i)] -= 1.0);
         Ok(linearised)
     }
+}
+
+/// Returns the derivatives of a function of the point where a flight ends by all unknowns, and its value. `row`: its factors.
+fn functional(
+    laws: &Laws,
+    now: &Carried,
+    (turns, turns_by): (f64, &RowDVector<f64>),
+    first_free: usize,
+    row: &dyn Fn(&System) -> Option<DVector<f64>>,
+) -> Extra {
+    let (orders, size) = (laws.system.orders(), now.state.len());
+    let at = point(orders, &now.state, turns);
+    let factors = row(&laws.system).unwrap_or_else(|| DVector::zeros(at.len()));
+    let of_state = factors.rows(0, size);
+    let mut by = of_state.transpose() * &now.by + turns_by * drift(orders, &factors, &at);
+    let value = |system: &System| row(system).map_or(0.0, |row| row.dot(&at));
+    (0..laws.free()).for_each(|j| by[first_free + j] += laws.slope(j, value));
+    (by, factors.dot(&at) + of_state.dot(&now.misfit))
 }
 
 /// Returns the derivatives of the time at which a series of impacts ends.
@@ -235,12 +274,18 @@ impl Linearised {
         (matrix, residual)
     }
 
-    /// Changes a solution by a step of all unknowns.
+    /// Changes a solution by a step of all unknowns, and makes its flights fit.
     pub(super) fn change(&self, at: &mut Solution, itinerary: &Itinerary, step: &DVector<f64>) {
+        at.ends.iter_mut().zip(&self.misfits).for_each(|(end, misfit)| *end += misfit);
+        self.shift(at, itinerary, step);
+    }
+
+    /// Shifts a solution by a step of all unknowns.
+    pub(super) fn shift(&self, at: &mut Solution, itinerary: &Itinerary, step: &DVector<f64>) {
         at.start += step.rows(0, at.start.len());
         let turns = &self.turns * step;
         for (i, passage) in itinerary.passages.iter().enumerate() {
-            at.ends[i] += &self.ends[i] * step + &self.misfits[i];
+            at.ends[i] += &self.ends[i] * step;
             at.turns[i] = turns[i] + if passage.is_event() { at.turns[i] } else { self.known[i] };
         }
         let free = at.values.len();

@@ -5,12 +5,25 @@ use std::ops::{Add, Mul, Sub};
 use crate::machine::System;
 use crate::model::{Model, ModelError};
 
-/// Step of differences, relative to the value of the parameter.
-const STEP: f64 = 3e-3;
+/// How exact derivatives by parameters are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Slopes {
+    /// To about `1e-10`, which is enough for the matrices of Newton's method.
+    Fast,
+    /// To about `1e-13`.
+    Exact,
+}
 
-/// Number of values of a parameter on either side of its value. With the coefficients of a model, which are smooth functions of its parameters
-/// between kinks, the differences are exact to about `1e-13`.
-const SIDE: usize = 3;
+impl Slopes {
+    /// Step of differences, relative to the value of the parameter, and the number of steps on either side. Coefficients of models are smooth
+    /// functions of parameters between kinks.
+    fn stencil(self) -> (f64, usize) {
+        match self {
+            Slopes::Fast => (1e-5, 1),
+            Slopes::Exact => (3e-3, 3),
+        }
+    }
+}
 
 /// A number that the laws of a cycle depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,9 +63,10 @@ pub(super) struct Laws {
 
 impl Laws {
     /// Computes the laws of a model, and their derivatives by `free`.
-    pub(super) fn new(model: &dyn Model, free: &[Free]) -> Result<Laws, ModelError> {
+    pub(super) fn new(model: &dyn Model, free: &[Free], slopes: Slopes) -> Result<Laws, ModelError> {
         let system = System::new(&model.oscillator()?);
-        let nearby = free.iter().map(|&free| nearby(model, &system, free)).collect::<Result<_, _>>()?;
+        let nearby =
+            free.iter().map(|&free| nearby(model, &system, free, slopes)).collect::<Result<_, _>>()?;
         Ok(Laws { system, nearby })
     }
 
@@ -73,13 +87,19 @@ impl Laws {
 }
 
 /// Returns the systems of a stencil around the value of a free number. At an end of the parameter's range all lie on one side.
-fn nearby(model: &dyn Model, system: &System, free: Free) -> Result<Vec<(f64, System)>, ModelError> {
+fn nearby(
+    model: &dyn Model,
+    system: &System,
+    free: Free,
+    slopes: Slopes,
+) -> Result<Vec<(f64, System)>, ModelError> {
     let (value, [least, most]) = match free {
         Free::CycleTime => (system.period(), [0.0, f64::INFINITY]),
         Free::Parameter(index) => (model.value(index), model.parameters()[index].range.ends()),
     };
-    let h = STEP * free.scale(model, value);
-    let reach = SIDE as f64 * h;
+    let (step, side) = slopes.stencil();
+    let h = step * free.scale(model, value);
+    let reach = side as f64 * h;
     let first = if value - reach < least {
         0.0
     } else if value + reach > most {
@@ -87,7 +107,7 @@ fn nearby(model: &dyn Model, system: &System, free: Free) -> Result<Vec<(f64, Sy
     } else {
         -reach
     };
-    let offsets: Vec<f64> = (0..=2 * SIDE).map(|k| first + k as f64 * h).collect();
+    let offsets: Vec<f64> = (0..=2 * side).map(|k| first + k as f64 * h).collect();
     let mut systems = Vec::new();
     for (k, offset) in offsets.iter().enumerate() {
         let weight = slope_at_zero(&offsets, k);

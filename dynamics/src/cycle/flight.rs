@@ -7,6 +7,9 @@ use nalgebra::{DMatrix, DVector};
 /// Number of terms of a Taylor series over one radian of the fastest rate; the next one is below `1e-21`.
 const TERMS: usize = 22;
 
+/// Size of two terms in a row, relative to the sum, after which the others are left out.
+const NEGLIGIBLE: f64 = 1e-18;
+
 /// Largest number of steps of a flight.
 const MOST_STEPS: f64 = 1e5;
 
@@ -22,11 +25,10 @@ impl Equations {
     /// Adds the rates of change of a point's state.
     fn add_rates(&self, point: &[f64], rates: &mut [f64]) {
         let n = self.accelerations.nrows();
-        for (i, rate) in rates[..n].iter_mut().enumerate() {
-            *rate += self.period * point[n + i];
-        }
-        for (column, x) in self.accelerations.column_iter().zip(point) {
-            rates[n..2 * n].iter_mut().zip(&column).for_each(|(rate, row)| *rate += row * x);
+        let (of_positions, of_velocities) = rates.split_at_mut(n);
+        of_positions.iter_mut().zip(&point[n..2 * n]).for_each(|(rate, v)| *rate += self.period * v);
+        for (column, x) in self.accelerations.as_slice().chunks_exact(n).zip(point) {
+            of_velocities.iter_mut().zip(column).for_each(|(rate, row)| *rate += row * x);
         }
     }
 }
@@ -108,27 +110,36 @@ impl Flight<'_> {
     /// Carries columns over `h` turns: a point, tangent vectors, and derivatives of the point by parameters.
     fn step(&self, columns: &mut DMatrix<f64>, h: f64) {
         let (width, count) = columns.shape();
-        let size = width - 2 * self.orders.len() - 1;
+        let (size, parameters) = (width - 2 * self.orders.len() - 1, count - self.by_parameter.len());
         let (mut term, mut next) = (columns.clone(), DMatrix::zeros(width, count));
+        let (mut small, sum) = (0, columns.as_mut_slice());
         for k in 1..=TERMS {
             next.fill(0.0);
-            let parameters = count - self.by_parameter.len();
+            let (from, to) = (term.as_slice(), next.as_mut_slice());
             for j in 0..count {
-                let (column, rates) = (
-                    &term.as_slice()[j * width..(j + 1) * width],
-                    &mut next.as_mut_slice()[j * width..(j + 1) * width],
-                );
+                let (column, rates) =
+                    (&from[j * width..(j + 1) * width], &mut to[j * width..(j + 1) * width]);
                 self.equations.add_rates(column, rates);
                 if let Some(by) = j.checked_sub(parameters).map(|j| &self.by_parameter[j]) {
-                    by.add_rates(&term.as_slice()[..width], rates);
+                    by.add_rates(&from[..width], rates);
                 }
                 for (k, order) in self.orders.iter().enumerate() {
                     let (at, rate) = (size + 2 * k, TAU * order);
                     (rates[at], rates[at + 1]) = (-rate * column[at + 1], rate * column[at]);
                 }
             }
-            next *= h / k as f64;
-            *columns += &next;
+            let factor = h / k as f64;
+            let mut is_small = true;
+            for (sum, term) in sum.iter_mut().zip(to) {
+                *term *= factor;
+                is_small = is_small && term.abs() <= NEGLIGIBLE * sum.abs();
+                *sum += *term;
+            }
+            // Even and odd terms may vanish apart from each other.
+            small = if is_small { small + 1 } else { 0 };
+            if small == 2 {
+                break;
+            }
             std::mem::swap(&mut term, &mut next);
         }
     }

@@ -3,6 +3,8 @@
 //! The functions here are linear in points `(x1 .. xn, v1 .. vn, cos, sin, ..., 1)` in the coordinates of the model. Unlike the coordinates of
 //! the flow, these do not depend on the values of parameters.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::domain::Functional;
@@ -47,6 +49,23 @@ pub(super) enum End {
     Period,
     /// Half a forcing period ends.
     Half,
+    /// A watch touches 0 and changes nothing.
+    Touch(Watch),
+}
+
+/// What a motion touches without an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touched {
+    /// A gap touches a wall from outside.
+    Wall,
+    /// A gap touches the wall of its contact while the contact lasts.
+    Contact,
+    /// The force of a contact falls to 0, or rises to 0 from below.
+    Force,
+    /// A sliding rate falls to 0, or a holding force rises to its limit.
+    Friction,
+    /// The argument of a curve reaches the end of its piece.
+    Piece,
 }
 
 /// A flight and its end.
@@ -65,7 +84,27 @@ pub struct Passage {
 impl Passage {
     /// Whether the time of the end is the root of a function. Otherwise the time is known.
     pub fn is_event(&self) -> bool {
-        matches!(self.end, End::Event(..))
+        matches!(self.end, End::Event(..) | End::Touch(_))
+    }
+
+    /// Returns what the motion touches at the end of the flight.
+    pub fn touches(&self) -> Option<Touched> {
+        let End::Touch(watch) = self.end else { return None };
+        Some(match watch {
+            Watch::Wall(..) => Touched::Wall,
+            Watch::OnsetEnds(..) | Watch::Leaves(..) => Touched::Contact,
+            Watch::PressingEnds(..) | Watch::ForceEnds(..) | Watch::ForceBegins(..) | Watch::PushEnds(..) => {
+                Touched::Force
+            }
+            Watch::RateVanishes(_) | Watch::Slips(..) => Touched::Friction,
+            Watch::Border(..) => Touched::Piece,
+        })
+    }
+
+    /// Returns the flight up to its event, where the event changes nothing; none if the end is no event.
+    pub(crate) fn touching(&self) -> Option<Passage> {
+        let End::Event(watch, _) = self.end else { return None };
+        Some(Passage { end: End::Touch(watch), ..self.clone() })
     }
 
     /// Whether the end is the limit of a series of infinitely many impacts.
@@ -76,6 +115,11 @@ impl Passage {
     /// Returns the same passage a whole number of forcing periods later.
     pub(crate) fn later(&self, periods: f64) -> Passage {
         Passage { period: self.period + periods as u64, turns: self.turns + periods, ..self.clone() }
+    }
+
+    /// Returns the same event at another time.
+    pub(crate) fn at(&self, turns: f64) -> Passage {
+        Passage { period: turns.floor() as u64, turns, ..self.clone() }
     }
 
     /// Whether another flight has the same modes.
@@ -130,10 +174,24 @@ impl System {
 
     /// Returns the row of the function that is 0 at the end of a flight; none if the end is no event.
     pub(crate) fn condition(&self, passage: &Passage) -> Option<DVector<f64>> {
-        let End::Event(watch, _) = &passage.end else { return None };
+        let (End::Event(watch, _) | End::Touch(watch)) = &passage.end else { return None };
         let (modes, roots, point) = (&passage.modes, &Roots::default(), &[0.0; WIDTH]);
         let moment = Moment { frame: self, domain: self.domain(modes), modes, roots, point };
         Some(self.in_state(&moment.function(*watch)))
+    }
+
+    /// Returns the row of the rate of change, per forcing period, of the function that is 0 at the end of a flight.
+    pub(crate) fn rate(&self, passage: &Passage) -> Option<DVector<f64>> {
+        let row = self.condition(passage)?;
+        let (degrees, period) = (self.degrees(), self.period);
+        let mut rate = self.accelerations(passage).tr_mul(&row.rows(degrees, degrees)) * period;
+        rate.rows_mut(degrees, degrees).axpy(period, &row.rows(0, degrees), 1.0);
+        for (m, order) in self.orders.iter().enumerate() {
+            let (at, turn) = (2 * degrees + 2 * m, TAU * order);
+            rate[at] += turn * row[at + 1];
+            rate[at + 1] -= turn * row[at];
+        }
+        Some(rate)
     }
 
     /// Returns the nth jump of the velocities at the end of a flight, if there is one; of a series, the jump at its start. `v`: the velocities
@@ -189,7 +247,7 @@ impl System {
             },
             End::Half => whole + 0.5,
             End::Period => whole + 1.0,
-            End::Event(..) | End::Series(_) => passage.turns,
+            End::Event(..) | End::Series(_) | End::Touch(_) => passage.turns,
         }
     }
 
