@@ -10,6 +10,7 @@ use crate::cli::say;
 use crate::findings::compare::TOLERANCE;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
+use crate::map::curves::Kind;
 use crate::map::scene::{Along, FigureStyle, Format, MAX_PERIODS, toml};
 use crate::map::shard::Shard;
 use crate::model_file::{DEFAULT as DEFAULT_MODEL, FileModel};
@@ -169,6 +170,7 @@ pub(crate) enum Command {
     Devices,
     Validate(Validate),
     Compare(Compare),
+    Curves(Curves),
     Check(Check),
     Completions(Completions),
     /// Measure how fast this machine computes maps
@@ -924,6 +926,63 @@ pub(crate) struct Compare {
     /// Print only errors and warnings
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+/// Follow the borders between the regions of a finished map: bifurcation curves
+///
+/// Where neighbouring cells have different motions, the cycle of one cell is followed to the other one. A fold, a flip (period
+/// doubling), a pitchfork (loss of symmetry) or a graze on the way is the first point of a curve, which is then followed over
+/// both axes. Each point solves the equations of the cycle to rounding, and its motion was run again: it has the same events.
+/// docs/curves.md explains the kinds. Writes curves.csv (one row per
+/// point), curve_points.csv (where two conditions meet), unexplained.csv (pairs of neighbours without a curve), curves.png (the
+/// map with its curves) and manifest.json. Ctrl-C keeps the curves that are found.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  \
+    rattlemap map scenes/e_omega.toml\n  \
+    rattlemap curves out/e_omega")]
+pub(crate) struct Curves {
+    /// Folder of a finished map over two parameters
+    #[arg(value_name = "DIR")]
+    pub(crate) map: PathBuf,
+
+    /// Kinds of curves: fold, flip, pitchfork, grazing, meshing_grazing, meshing_border, contact_end, sticking [default: all]
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kind)]
+    pub(crate) kind: Vec<Kind>,
+
+    /// Longest cycles that are followed, in forcing periods
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub(crate) longest: u32,
+
+    /// Largest number of curves
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) most_curves: u32,
+
+    /// Largest number of points of each part of a curve. A new part begins where the order of events changes
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) most_points: u32,
+
+    /// Folder to write to [default: out/curves/<DIR's name>]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    /// Formats of the figure: png, svg, pdf [default: png]. Figures of other formats that the folder has are drawn again, too.
+    /// Example: --format png,pdf
+    #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
+    pub(crate) format: Vec<Format>,
+
+    /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
+    #[arg(long)]
+    pub(crate) force: bool,
+
+    /// Print only errors and warnings
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Reads the kind of a curve.
+fn parse_kind(text: &str) -> Result<Kind, String> {
+    Kind::named(text)
+        .ok_or_else(|| format!("there is no such kind; the kinds are {}", Kind::NAMES.join(", ")))
 }
 
 /// Check the files of a folder against its manifest, and repair them

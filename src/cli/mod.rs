@@ -7,6 +7,7 @@ mod check;
 mod compare;
 mod completions;
 mod console;
+mod curves;
 mod devices;
 mod explore;
 pub mod failure;
@@ -59,6 +60,7 @@ pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Devices => devices::run(),
         Command::Validate(arguments) => validate::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Curves(arguments) => curves::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Bench(Bench::Engines(arguments)) => bench::run(&arguments),

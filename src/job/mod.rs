@@ -3,6 +3,7 @@
 
 pub mod check;
 pub mod compare;
+pub mod curves;
 pub mod devices;
 pub mod engine_choice;
 pub mod environment;

@@ -19,4 +19,5 @@ pub mod sweep;
 pub mod bifurcation;
 pub mod branches;
 pub mod catalogue;
+pub mod curves;
 pub mod cycle;

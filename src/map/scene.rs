@@ -400,6 +400,15 @@ impl Scene {
         self.cell_count().saturating_mul(self.draw.map_or(1, |draw| u64::from(draw.count)))
     }
 
+    /// Returns the names of a derived parameter and of an axis on which it depends, if there are any.
+    pub fn derived_along_axes(&self) -> Option<(&str, &str)> {
+        let axes = || self.axes().iter().filter_map(|axis| Some((axis.target().parameter()?, axis)));
+        self.points.derived().rules().iter().find_map(|rule| {
+            let (_, axis) = axes().find(|(index, _)| rule.follows(*index))?;
+            Some((&*rule.parameter().name, &*axis.parameter().name))
+        })
+    }
+
     /// Returns the model of a cell, given its index on each axis, or its place in the list.
     ///
     /// # Panics

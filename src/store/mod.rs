@@ -2,6 +2,7 @@
 
 pub mod bifurcation;
 pub mod compare;
+pub mod curves;
 pub mod error;
 pub mod file_names;
 pub mod finished_map;

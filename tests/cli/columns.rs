@@ -46,6 +46,13 @@ fn the_page_lists_the_columns_of_all_files() {
     run(&folder, "orbit --from-start 2 --out out/first").code(0);
     run(&folder, "compare out/plane out/plane --quiet").code(0);
     assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));
+    run(&folder, "curves out/plane --quiet").code(0);
+    for name in ["curves.csv", "curve_points.csv", "unexplained.csv"] {
+        let all = header(&dir.join("out/curves/plane").join(name));
+        let is_first = |name: &&String| !name.starts_with("multiplier") || name.starts_with("multiplier1_");
+        let named: Vec<&str> = listed(name).into_iter().filter(|name| *name != "...").collect();
+        assert_eq!(all.iter().filter(is_first).collect::<Vec<_>>(), named, "{name}");
+    }
     // Maps of lanes have a further column (map/engines.rs).
     let listed_cells = listed("cells.csv and cells.npy").into_iter().filter(|name| *name != "finished");
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed_cells.collect::<Vec<_>>());

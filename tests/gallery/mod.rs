@@ -10,6 +10,7 @@ mod branches;
 mod chaos_ends;
 mod clearance;
 mod clutch;
+mod curves;
 mod drift;
 mod elastic;
 mod engines;

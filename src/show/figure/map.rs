@@ -3,9 +3,11 @@
 use std::cmp::Reverse;
 use std::f64::consts::PI;
 
+use crate::map::curves::{Curve, CurvePoint, Curves, Kind};
 use crate::map::scene::{Axis, Target, place};
 use crate::show::caption;
 use crate::show::cells::Cells;
+use crate::show::drawing::frame::Frame;
 use crate::show::drawing::legend::Key;
 use crate::show::drawing::{Align, Canvas, Color, DARK, Marker, Point, Rect, SMALL, WHITE, wall_color};
 use crate::show::figure::map_layout::{LegendKey, LegendRow, MapFigure};
@@ -24,6 +26,9 @@ const STRIPES: usize = 5;
 const LINE_COLORS: [fn() -> Color; 3] = [|| DARK, || wall_color(Side::Right), || wall_color(Side::Left)];
 const LINE: f64 = 3.0;
 const RIM: f64 = 7.0;
+/// Width of a bifurcation curve and of its rim.
+const CURVE: f64 = 2.0;
+const CURVE_RIM: f64 = 3.5;
 /// Marker of a strobe state of an attractor.
 const ATTRACTOR: Marker = Marker { hollow: true, ..Marker::dot(DARK, 8.0) };
 /// Largest distance of an attractor from the plane of the starts, relative to its size.
@@ -31,6 +36,11 @@ const IN_PLANE: f64 = 1e-9;
 
 /// Draws one of the layers of a map.
 pub fn draw(cells: &Cells<'_>, layers: &[Layer], layer: &Layer) -> Canvas {
+    draw_with(cells, layers, layer, None)
+}
+
+/// Draws one of the layers of a map, with its bifurcation curves.
+pub fn draw_with(cells: &Cells<'_>, layers: &[Layer], layer: &Layer, curves: Option<&Curves>) -> Canvas {
     let scene = cells.scene();
     let subtitle = format!("{}; {}\n{}", layer.title, caption::integration(scene), caption::of_scene(scene));
     let mut rows = rows(layer, cells.count());
@@ -47,6 +57,10 @@ pub fn draw(cells: &Cells<'_>, layers: &[Layer], layer: &Layer) -> Canvas {
         let key = Key::Line { color: color(scene.lines().len() + nth), width: LINE };
         let values: Vec<String> = contour.lines.iter().map(|(value, _)| number(*value)).collect();
         rows.push(LegendRow::drawn(key, &format!("{}: {}", contour.name, values.join(", "))));
+    }
+    for (kind, _) in curves_by_kind(curves) {
+        let key = Key::Line { color: curve_color(kind), width: CURVE };
+        rows.push(LegendRow::drawn(key, &kind.name().replace('_', " ")));
     }
     let attractors = attractors(cells);
     if !attractors.is_empty() {
@@ -77,6 +91,11 @@ pub fn draw(cells: &Cells<'_>, layers: &[Layer], layer: &Layer) -> Canvas {
             draw_contours(canvas, cells.counts(), frame.rect, &contours, |nth| {
                 color(scene.lines().len() + nth)
             });
+            for (kind, curves) in curves_by_kind(curves) {
+                for curve in curves {
+                    draw_curve(canvas, frame, curve, curve_color(kind));
+                }
+            }
             attractors.iter().for_each(|(x, y)| canvas.marker(frame.at(*x, *y), ATTRACTOR));
         },
     )
@@ -111,6 +130,45 @@ fn rows(layer: &Layer, total: usize) -> Vec<LegendRow> {
 fn draw_line(canvas: &Canvas, parts: &[Vec<Point>], color: Color) {
     for (width, color) in [(RIM, WHITE), (LINE, color)] {
         parts.iter().for_each(|part| canvas.stroke(part, width, color));
+    }
+}
+
+/// Returns the curves of each kind that there is.
+fn curves_by_kind(curves: Option<&Curves>) -> Vec<(Kind, Vec<&Curve>)> {
+    let all = || curves.iter().flat_map(|found| &found.curves);
+    let of = |kind: Kind| (kind, all().filter(|curve| curve.kind == kind).collect::<Vec<_>>());
+    Kind::ALL.map(of).into_iter().filter(|(_, curves)| !curves.is_empty()).collect()
+}
+
+/// Returns the colour of curves of a kind.
+fn curve_color(kind: Kind) -> Color {
+    match kind {
+        Kind::Fold => [0xd5, 0x1f, 0x1f],
+        Kind::Flip => [0x10, 0x6b, 0x2c],
+        Kind::Pitchfork => [0x7a, 0x1f, 0xa2],
+        Kind::Grazing => [0xf2, 0x8e, 0x00],
+        Kind::MeshingGrazing => [0xb1, 0x7a, 0x00],
+        Kind::MeshingBorder => [0x00, 0x8c, 0x95],
+        Kind::ContactEnd => DARK,
+        Kind::Sticking => [0x8a, 0x4b, 0x2a],
+    }
+}
+
+/// Draws a curve with a white rim. Parts of unstable cycles are dashed.
+fn draw_curve(canvas: &Canvas, frame: &Frame, curve: &Curve, color: Color) {
+    let path = |points: &[CurvePoint]| -> Vec<Point> {
+        points.iter().map(|point| frame.at(point.values[0], point.values[1])).collect()
+    };
+    canvas.stroke(&path(&curve.points), CURVE_RIM, WHITE);
+    let mut start = 0;
+    for part in curve.points.chunk_by(|a, b| a.stable == b.stable) {
+        let end = start + part.len();
+        let path = path(&curve.points[start.max(1) - 1..end]);
+        match part[0].stable {
+            true => canvas.stroke(&path, CURVE, color),
+            false => canvas.dashes(&path, CURVE, color),
+        }
+        start = end;
     }
 }
 

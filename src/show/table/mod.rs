@@ -7,6 +7,7 @@ pub mod cell_columns;
 pub mod cells_csv;
 pub mod cells_npy;
 pub mod compare_csv;
+pub mod curve_tables;
 pub mod orbit_tables;
 pub mod words_csv;
 

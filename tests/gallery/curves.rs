@@ -1,0 +1,96 @@
+//! Bifurcation curves that are found from maps, compared with closed forms.
+
+use std::f64::consts::PI;
+use std::sync::atomic::AtomicBool;
+
+use crate::common::built_in;
+use rattlemap::job::{self, Processor};
+use rattlemap::map::curves::{Curve, Curves, Kind, Search, curves};
+use rattlemap::map::scene::{Quantity, Scene, Start};
+use rattlemap_dynamics::model::REST;
+
+/// Finds the curves of a small map.
+fn found(model: &str, axes: [(&str, [f64; 2]); 2], longest: u32, start: Start) -> Curves {
+    let [(x, [left, right]), (y, [low, high])] = axes;
+    let scene = Scene::builder(built_in(model, &[]))
+        .axis(x, left..=right, 20)
+        .axis(y, low..=high, 20)
+        .start(start)
+        .quantities(&[Quantity::Class, Quantity::Word])
+        .build()
+        .unwrap();
+    let map = job::run(&scene, Processor::Cpu).unwrap();
+    let search = Search { longest, kinds: &[], most_curves: 100, most_points: 1000 };
+    curves(&scene, map.plan(), map.records(), &search, &|_, _| (), &AtomicBool::new(false))
+}
+
+/// Returns the curves of a kind and period whose cycles have one event in each cycle, or none.
+fn of(found: &Curves, kind: Kind, period: u32) -> Vec<&Curve> {
+    found
+        .curves
+        .iter()
+        .filter(|curve| curve.kind == kind && curve.period == period && curve.word.len() <= 1)
+        .collect()
+}
+
+/// Returns the largest distance of the points of curves from a closed form, relative to the axis.
+fn largest_error(curves: &[&Curve], range: [f64; 2], closed: impl Fn(f64) -> f64) -> f64 {
+    let error = |curve: &Curve| {
+        let off = curve.points.iter().map(|point| (point.values[1] - closed(point.values[0])).abs());
+        off.fold(0.0, f64::max) / (range[1] - range[0])
+    };
+    curves.iter().map(|curve| error(curve)).fold(0.0, f64::max)
+}
+
+/// COCO's impact oscillator, x'' + 0.1 x' + x = A cos(omega t) with a stop at 1 and e = 0.8: the largest displacement without contact is
+/// A / |1 - omega^2 + 0.1 i omega|, and cycles with one impact in n periods fold at a share of this amplitude (Dankowicz and Schilder 2013,
+/// section 15.2).
+#[test]
+fn folds_and_grazes_of_an_impact_oscillator_lie_on_their_closed_forms() {
+    let (z, e) = (0.05, 0.8);
+    let grazing = |omega: f64| (1.0 - omega * omega).hypot(2.0 * z * omega);
+    let fold = |n: f64, omega: f64| {
+        let w = f64::sqrt(1.0 - z * z);
+        let tau = 2.0 * PI * n / omega;
+        let (decay, (s, c)) = ((-z * tau).exp(), (w * tau).sin_cos());
+        let b = (1.0 - decay * c) / (decay * s);
+        let (h0, h1) = (-z + w * b, -z + w * decay * (b * c - s));
+        let g = (h0 + e * h1) / (omega * (1.0 + e));
+        grazing(omega) * g.abs() / g.hypot(1.0)
+    };
+    let amplitudes = [0.05, 1.5];
+    let near = found("coco-impact", [("omega", [1.02, 1.5]), ("A", amplitudes)], 1, Start::Rest);
+    let ends = of(&near, Kind::ContactEnd, 1);
+    assert!(!ends.is_empty() && largest_error(&ends, amplitudes, grazing) < 1e-9, "{ends:?}");
+    let folds = of(&near, Kind::Fold, 1);
+    assert!(!folds.is_empty(), "{:?}", near.failures);
+    assert!(largest_error(&folds, amplitudes, |omega| fold(1.0, omega)) < 1e-9);
+    let twice = found("coco-impact", [("omega", [2.1, 2.9]), ("A", [0.5, 6.0])], 2, Start::Rest);
+    let folds = of(&twice, Kind::Fold, 2);
+    assert!(!folds.is_empty(), "{:?}", twice.failures);
+    assert!(largest_error(&folds, [0.5, 6.0], |omega| fold(2.0, omega)) < 1e-9);
+    // Along the end of contact nothing else happens; each curve crosses the whole map.
+    assert!(
+        ends.iter()
+            .any(|curve| curve.points[0].values[0].min(curve.points.last().unwrap().values[0]) < 1.021)
+    );
+}
+
+/// A ball on a shaking table with g = omega = 1 (Holmes 1982; Luck and Mehta 1993): one bounce in n periods begins at the fold
+/// A = n pi (1 - e) / (1 + e), and its period doubles at A^2 = A_fold^2 + (2 (1 + e^2) / (1 + e)^2)^2.
+#[test]
+fn folds_and_flips_of_a_bouncing_ball_lie_on_their_closed_forms() {
+    let range = [0.2, 4.0];
+    // A ball that lies on the table at first would stay near it.
+    let mut thrown = REST;
+    thrown[1] = 3.0;
+    let found = found("shaking-table", [("e", [0.1, 0.85]), ("A", range)], 1, Start::State(thrown));
+    let fold = |e: f64| PI * (1.0 - e) / (1.0 + e);
+    let flip = |e: f64| fold(e).hypot(2.0 * (1.0 + e * e) / (1.0 + e).powi(2));
+    for (kind, closed) in [(Kind::Fold, &fold as &dyn Fn(f64) -> f64), (Kind::Flip, &flip)] {
+        let curves = of(&found, kind, 1);
+        assert!(!curves.is_empty(), "{kind:?}: {:?}", found.failures);
+        let error = largest_error(&curves, range, closed);
+        assert!(error < 1e-9, "{kind:?}: {error}");
+    }
+}
