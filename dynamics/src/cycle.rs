@@ -13,12 +13,14 @@ mod curve;
 mod equations;
 mod family;
 mod flight;
+mod search;
 
 pub use branch::{
     Branch, BranchEnd, BranchLimits, BranchPoint, Special, SpecialPoint, follow, follow_on, switch,
 };
 pub use curve::{Condition, Seed, curve};
 pub use family::Free;
+pub use search::Cycle;
 
 use std::f64::consts::TAU;
 
@@ -26,7 +28,7 @@ use equations::Linearised;
 use family::{Laws, Slopes};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
-use crate::machine::{MachineMotion, Passage, System};
+use crate::machine::{Limit, MachineMotion, Passage, System, Touched};
 use crate::model::{Model, ModelError, REST, State, Timing};
 use crate::motion::{GapEvent, Observer, SlipEvent, States, Stop};
 use crate::word::Word;
@@ -48,8 +50,14 @@ const NEAR: f64 = 1e-6;
 /// Largest distance of a cycle from a shorter one where two branches meet, relative to the scales of the unknowns.
 const SAME: f64 = 1e-4;
 
+/// Changes of the state at phase 0, relative to the scales of the unknowns, that bring an impact from its limit to either side.
+const BESIDE_LIMIT: f64 = 1e-10;
+
 /// Time from phase 0, in turns, within which an event may pass it.
 const BESIDE: f64 = 1e-3;
+
+/// Largest step after which derivatives of further equations are not computed again, relative to the scales of the unknowns.
+const SHORT: f64 = 1e-3;
 
 /// Ratio of two steps above which the method leads elsewhere.
 const GROWS: f64 = 2.0;
@@ -103,8 +111,18 @@ pub struct Solution {
 /// One more equation: its derivatives by all unknowns, and its residual.
 type Extra = (RowDVector<f64>, f64);
 
-/// Returns further equations at approximate values of the unknowns.
-type Extras<'a> = dyn Fn(&Laws, &Linearised, &Solution) -> Result<Vec<Extra>, CycleError> + 'a;
+/// Returns further equations at approximate values of the unknowns. The last argument: the ones of a nearby solution, or none; their
+/// derivatives will do here, too.
+type Extras<'a> = dyn Fn(&Laws, &Linearised, &Solution, &[Extra]) -> Result<Vec<Extra>, CycleError> + 'a;
+
+/// What Newton's method has found.
+struct Found {
+    solution: Solution,
+    /// Number of steps.
+    steps: usize,
+    /// The laws and the further equations near the solution.
+    nearby: (Laws, Vec<Extra>),
+}
 
 impl Itinerary {
     /// Follows the motion from a state at phase 0 for a number of half forcing periods. If the number is odd, the cycle is its own mirror image.
@@ -176,21 +194,43 @@ impl Itinerary {
             return false;
         }
         let system = System::new(&oscillator);
-        let half_periods = self.half_periods(&system);
-        let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
-        let Ok(passages) = motion.passages(half_periods) else { return false };
         let Ok(scales) = self.scales(model, solution, &[]) else { return false };
+        let is_run = |state: &State| self.is_run(&system, state, solution, &scales);
+        let states = self.beside_limit(solution, &scales);
+        // At a limit some nearby motions have this sequence of flights, and others have not.
+        states.iter().any(is_run) && (states.len() == 1 || !states.iter().all(is_run))
+    }
+
+    /// Returns the states at phase 0 from which the motion may have this sequence of flights: where an impact is at its limit, rounding errors
+    /// decide what follows, and nearby states lie on either side.
+    fn beside_limit(&self, solution: &Solution, scales: &[f64]) -> Vec<State> {
+        let mut states = vec![solution.state()];
+        if self.passages.iter().any(|passage| passage.limit().is_some()) {
+            for i in 0..solution.start.len() {
+                for sign in [1.0, -1.0] {
+                    let mut start = solution.start.clone();
+                    start[i] += sign * BESIDE_LIMIT * scales[i];
+                    states.push(in_pairs(&start));
+                }
+            }
+        }
+        states
+    }
+
+    /// Whether the motion from a state has this sequence of flights.
+    fn is_run(&self, system: &System, state: &State, solution: &Solution, scales: &[f64]) -> bool {
+        let half_periods = self.half_periods(system);
+        let motion = MachineMotion::new(system, state).in_modes(&self.passages[0], None);
+        let Ok(passages) = motion.passages(half_periods) else { return false };
         let is_near = |passage: &Passage, end: &DVector<f64>| {
             let difference = in_blocks(&passage.state, system.degrees()) - end;
-            difference.iter().zip(&scales).all(|(x, scale)| x.abs() <= NEAR * scale)
+            difference.iter().zip(scales).all(|(x, scale)| x.abs() <= NEAR * scale)
         };
         // At a touch the motion may have a tiny event.
-        let times = self.passages.iter().zip(&solution.turns);
-        let touches: Vec<f64> =
-            times.filter(|(passage, _)| passage.touches().is_some()).map(|(_, turns)| *turns).collect();
+        let touches = self.touches(solution);
         let last = 0.5 * f64::from(half_periods);
         let mut expected =
-            self.passages.iter().zip(&solution.ends).filter(|(passage, _)| passage.touches().is_none());
+            self.passages.iter().zip(&solution.ends).filter(|(passage, _)| !passage.is_touch());
         let mut next = expected.next();
         for passage in &passages {
             if next.is_some_and(|(other, end)| other.is_like(passage) && is_near(passage, end)) {
@@ -240,31 +280,84 @@ impl Itinerary {
         Some(())
     }
 
-    /// Returns another sequence of flights with the touches of this one.
+    /// Returns another sequence of flights with the touches and limits of this one.
     fn touching(&self, solution: &Solution, other: (Itinerary, Solution)) -> Option<(Itinerary, Solution)> {
         let (mut next, mut seed) = other;
         for (i, passage) in self.passages.iter().enumerate() {
-            if passage.touches().is_some() {
+            if passage.is_touch() {
                 next.insert(&mut seed, passage, (&solution.ends[i], solution.turns[i]))?;
+            } else if let Some(limit) = passage.limit() {
+                let is_same = |at: &usize| {
+                    let follows = |a: &Passage, b: &Passage| a.has_modes_of(b);
+                    let after = next.passages.get(at + 1).zip(self.passages.get(i + 1));
+                    next.passages[*at].is_like(passage) && after.is_none_or(|(a, b)| follows(a, b))
+                };
+                let length = self.passages.last()?.turns;
+                // The impact may pass phase 0.
+                let off = |at: &usize| {
+                    let apart = next.passages[*at].turns - solution.turns[i];
+                    (apart - length * (apart / length).round()).abs()
+                };
+                let places = (0..next.passages.len()).filter(is_same);
+                let at = places.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|at| off(at) <= BESIDE)?;
+                next.passages[at] = next.passages[at].limited(limit)?;
             }
         }
         Some((next, seed))
     }
 
-    /// Returns the sequence of flights with a touch where the motion along an approximate solution first has another event.
-    fn with_next_touch(&self, model: &dyn Model, solution: &Solution) -> Option<(Itinerary, Solution)> {
-        let (run, seed) = {
-            let system = System::new(&model.oscillator().ok()?);
-            let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
-            let passages = motion.passages(self.half_periods(&system)).ok()?;
-            let ends = passages.iter().map(|passage| in_blocks(&passage.state, system.degrees()));
-            (ends.collect::<Vec<_>>(), passages)
-        };
-        let at = seed.iter().zip(&self.passages).position(|(a, b)| !a.is_like(b))?;
-        let touch = seed[at].touching().filter(|_| seed[at].has_modes_of(&self.passages[at]))?;
-        let (mut longer, mut start) = (self.clone(), solution.clone());
-        longer.insert(&mut start, &touch, (&run[at], seed[at].turns))?;
-        Some((longer, start))
+    /// Returns the flights of the motion along an approximate solution, and the place of the first one that is not in this sequence: among the
+    /// motion's flights, and among those here.
+    fn departure(&self, model: &dyn Model, solution: &Solution) -> Option<(Vec<Passage>, usize, usize)> {
+        let system = System::new(&model.oscillator().ok()?);
+        let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
+        let mut run = motion.passages(self.half_periods(&system)).ok()?;
+        // At a touch the motion may have a tiny event.
+        let touches = self.touches(solution);
+        run.retain(|passage| {
+            !passage.is_event() || touches.iter().all(|turns| (turns - passage.turns).abs() > BESIDE)
+        });
+        let own = || self.passages.iter().enumerate().filter(|(_, passage)| !passage.is_touch());
+        let nth = run.iter().zip(own()).position(|(a, (_, b))| !a.is_like(b))?;
+        let (place, _) = own().nth(nth)?;
+        Some((run, nth, place))
+    }
+
+    /// Returns what the motion along an approximate solution meets where it first leaves this sequence of flights.
+    fn first_change(&self, model: &dyn Model, solution: &Solution) -> Option<Touched> {
+        let (run, nth, place) = self.departure(model, solution)?;
+        let touch = |a: &Passage, b: &Passage| a.touching().filter(|_| a.has_modes_of(b))?.touches();
+        let (there, here) = (&run[nth], &self.passages[place]);
+        let impact = if there.meets_event_of(here) { Some(place) } else { place.checked_sub(1) };
+        let is_impact = impact.is_some_and(|at| self.passages[at].limited(Limit::Leaving).is_some());
+        match there.meets_event_of(here) || !there.has_modes_of(here) {
+            true => is_impact.then_some(Touched::Limit),
+            // Of the two events the earlier one is new, or has vanished.
+            false if there.turns < solution.turns[place] => touch(there, here),
+            false => touch(here, there),
+        }
+    }
+
+    /// Returns sequences of flights that may explain why the motion along an approximate solution has another one: the motion touches what it
+    /// first meets there, or an impact is at its limit.
+    fn with_next_touch(&self, model: &dyn Model, solution: &Solution) -> Option<Vec<(Itinerary, Solution)>> {
+        let (run, nth, place) = self.departure(model, solution)?;
+        let (there, here, mut all) = (&run[nth], &self.passages[place], Vec::new());
+        if let Some(touch) = there.touching().filter(|_| there.has_modes_of(here)) {
+            let (mut longer, mut start) = (self.clone(), solution.clone());
+            let state = in_blocks(&there.state, start.start.len() / 2);
+            all.extend(longer.insert(&mut start, &touch, (&state, there.turns)).map(|()| (longer, start)));
+        }
+        // The modes after an impact may differ, or its impulse.
+        let impact = if there.meets_event_of(here) { Some(place) } else { place.checked_sub(1) };
+        for limit in [Limit::Leaving, Limit::Pressing] {
+            if let Some((at, limited)) = impact.and_then(|at| Some((at, self.passages[at].limited(limit)?))) {
+                let mut other = self.clone();
+                other.passages[at] = limited;
+                all.push((other, solution.clone()));
+            }
+        }
+        Some(all)
     }
 
     /// Returns the states after the first event and before the last one if they are so near to phase 0 that they may pass it.
@@ -314,6 +407,12 @@ impl Itinerary {
         !self.mirrored && apart.iter().zip(&scales).all(|(x, scale)| x.abs() <= SAME * scale)
     }
 
+    /// Returns the times at which the motion touches something without an event.
+    fn touches(&self, solution: &Solution) -> Vec<f64> {
+        let times = self.passages.iter().zip(&solution.turns);
+        times.filter(|(passage, _)| passage.is_touch()).map(|(_, turns)| *turns).collect()
+    }
+
     /// Returns the number of events.
     pub fn events(&self) -> usize {
         self.passages.iter().filter(|passage| passage.is_event()).count()
@@ -326,8 +425,9 @@ impl Itinerary {
     pub fn solve(&self, model: &dyn Model, from: &Solution) -> Result<Solution, CycleError> {
         let free = own(model)?;
         let scales = self.scales(model, from, &free)?;
-        let extra = |_: &Laws, linearised: &Linearised, _: &Solution| Ok(phase(linearised, &free));
-        Ok(self.newton(model, from.clone(), &free, &scales, &extra)?.0)
+        let extra =
+            |_: &Laws, linearised: &Linearised, _: &Solution, _: &[Extra]| Ok(phase(linearised, &free));
+        Ok(self.newton(model, from.clone(), &free, &scales, &extra)?.solution)
     }
 
     /// Solves the equations together with others for as many free numbers.
@@ -338,12 +438,18 @@ impl Itinerary {
         free: &[Free],
         scales: &[f64],
         extra: &Extras<'_>,
-    ) -> Result<(Solution, usize), CycleError> {
-        let mut before = f64::INFINITY;
-        for count in 1.. {
-            let laws = Laws::new(&*placed(model, free, &at.values), free, Slopes::Fast)?;
+    ) -> Result<Found, CycleError> {
+        let (mut before, mut known) = (f64::INFINITY, None);
+        for steps in 1.. {
+            let nearby: Option<&(Laws, Vec<Extra>)> = known.as_ref().filter(|_| before <= SHORT);
+            let here = placed(model, free, &at.values);
+            let laws = match nearby {
+                Some((laws, _)) => laws.beside(&*here)?,
+                None => Laws::new(&*here, free, Slopes::Fast)?,
+            };
             let linearised = self.linearise(&laws, &at)?;
-            let (matrix, residual) = linearised.with(&extra(&laws, &linearised, &at)?);
+            let extra = extra(&laws, &linearised, &at, nearby.map_or(&[], |(_, extra)| extra))?;
+            let (matrix, residual) = linearised.with(&extra);
             let step = solve_scaled(&matrix, &-residual, scales).ok_or(CycleError::Diverges)?;
             let length =
                 step.iter().zip(scales).fold(0.0, |most: f64, (x, scale)| most.max((x / scale).abs()));
@@ -355,14 +461,14 @@ impl Itinerary {
             // Near singular equations, steps become rounding errors earlier: they do not shrink.
             let stagnates = length <= STAGNANT && length > SHRINKS * before;
             // The next step is shorter at least by the ratio of the last two.
-            let next = if count == 1 { length } else { length * length / before };
+            let next = if steps == 1 { length } else { length * length / before };
             if length.min(next) <= CONVERGED || stagnates {
-                return Ok((at, count));
+                return Ok(Found { solution: at, steps, nearby: (laws, extra) });
             }
-            if count == MOST_STEPS {
+            if steps == MOST_STEPS {
                 break;
             }
-            before = length;
+            (before, known) = (length, Some((laws, extra)));
         }
         Err(CycleError::Diverges)
     }
@@ -478,15 +584,20 @@ impl Solution {
         DVector::from_vec(all)
     }
 
+    /// Returns the sum with a multiple of another one of the same sequence of flights.
+    fn plus(&self, other: &Solution, factor: f64) -> Solution {
+        let sum = |a: &DVector<f64>, b: &DVector<f64>| a + b * factor;
+        Solution {
+            start: sum(&self.start, &other.start),
+            ends: self.ends.iter().zip(&other.ends).map(|(a, b)| sum(a, b)).collect(),
+            turns: self.turns.iter().zip(&other.turns).map(|(a, b)| a + b * factor).collect(),
+            values: sum(&self.values, &other.values),
+        }
+    }
+
     /// Returns the solution at a share of the way to another one of the same sequence of flights.
     fn between(&self, other: &Solution, share: f64) -> Solution {
-        let along = |a: &DVector<f64>, b: &DVector<f64>| a + (b - a) * share;
-        Solution {
-            start: along(&self.start, &other.start),
-            ends: self.ends.iter().zip(&other.ends).map(|(a, b)| along(a, b)).collect(),
-            turns: self.turns.iter().zip(&other.turns).map(|(a, b)| a + (b - a) * share).collect(),
-            values: along(&self.values, &other.values),
-        }
+        self.plus(&other.plus(self, -1.0), share)
     }
 
     /// Returns the times of the ends of all flights since phase 0, in forcing periods.

@@ -43,6 +43,7 @@ pub use impact::LOWEST_FLIGHT;
 pub(crate) use motion::CarriedModes;
 pub use motion::{MachineMotion, TIE};
 pub use outputs::{Outputs, Situation};
+pub(crate) use passages::Limit;
 pub use passages::{Passage, Touched};
 pub use table::{Equations, StartModes};
 

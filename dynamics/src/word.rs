@@ -14,6 +14,9 @@
 //! | sliding reverses without sticking | `0` |
 
 use std::fmt;
+use std::str::FromStr;
+
+use crate::model::MOST_GAPS;
 
 /// Marks a symbol `b'0'..=b'7'` with its gap, for oscillators with several gaps. The gap's letter is then written before it, as in `b3`.
 pub fn of_gap(symbol: u8, gap: usize) -> u8 {
@@ -102,6 +105,32 @@ impl Word {
     }
 }
 
+/// A text that is no word.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is no word: it needs digits from 0 to 7, or digits with the letters of their gaps, such as 135462 or a2b3"
+)]
+pub struct WordError(String);
+
+impl FromStr for Word {
+    type Err = WordError;
+
+    /// Reads the symbols of a word from any place of its cycle. Tables write a `w` before them.
+    fn from_str(text: &str) -> Result<Word, WordError> {
+        let (mut symbols, mut gap) = (Vec::new(), None);
+        for byte in text.strip_prefix('w').unwrap_or(text).bytes() {
+            match byte {
+                b'0'..=b'7' => symbols.push(gap.take().map_or(byte, |gap| of_gap(byte, gap))),
+                b'a'..=b'z' if gap.is_none() && usize::from(byte - b'a') < MOST_GAPS => {
+                    gap = Some(usize::from(byte - b'a'));
+                }
+                _ => return Err(WordError(text.to_owned())),
+            }
+        }
+        if gap.is_some() { Err(WordError(text.to_owned())) } else { Ok(Word::cyclic(&symbols)) }
+    }
+}
+
 impl fmt::Display for Word {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.time_order())
@@ -135,6 +164,16 @@ fn smallest_rotation(s: &[u8]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_are_read_from_any_place_of_their_cycle() {
+        for (text, canonical) in [("135462", "135462"), ("w462135", "135462"), ("b3a2", "a2b3"), ("w", "")] {
+            assert_eq!(text.parse::<Word>().unwrap().time_order(), canonical);
+        }
+        for text in ["138", "a", "2a", "ab3", "z2", "1 2"] {
+            assert!(text.parse::<Word>().is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn paper_notation_is_that_of_the_paper() {

@@ -17,6 +17,7 @@ from .bifurcation import bifurcation  # noqa: E402
 from .cells import cells  # noqa: E402
 from .check import FileFault, check  # noqa: E402
 from .compare import Comparison, compare  # noqa: E402
+from .curves import Curves, curves  # noqa: E402
 from .devices import Devices, devices  # noqa: E402
 from .errors import EngineError, FolderError, ModelError, RattlemapError, SceneError  # noqa: E402
 from .explore import Explorer, explore  # noqa: E402
@@ -30,6 +31,7 @@ from .validate import Validation, validate  # noqa: E402
 
 __all__ = [
     "Comparison",
+    "Curves",
     "Devices",
     "EngineError",
     "Explorer",
@@ -47,6 +49,7 @@ __all__ = [
     "cells",
     "check",
     "compare",
+    "curves",
     "devices",
     "explore",
     "gear_pair",

@@ -6,12 +6,16 @@ use std::time::Instant;
 use pyo3::prelude::*;
 use rattlemap::job::check;
 use rattlemap::job::compare::CompareJob;
+use rattlemap::job::curves::CurvesJob;
 use rattlemap::job::observer::Observer;
 use rattlemap::job::validate::ValidateJob;
+use rattlemap::map::curves::{Kind, Search};
 use rattlemap::store::finished_map;
 use rattlemap::store::folder::Folder;
 use rattlemap::store::in_memory;
 use rattlemap::store::inventory::Fault;
+
+use rattlemap_dynamics::word::Word;
 
 use crate::problem::Problem;
 use crate::worker::{self, Collector};
@@ -66,6 +70,48 @@ pub(crate) fn compare(
         let Some(result) = job.compare(tolerance, &observer, watch.halt())? else { return Ok(None) };
         let (json, table) = in_memory::comparison(&result.pair(&result.cells()))?;
         Ok(Some((json, table, observer.lines())))
+    })
+}
+
+/// Tables `curves.csv`, `curve_points.csv` and `unexplained.csv`, numbers of pairs of cells, and warnings.
+type CurveTables = ([String; 3], Option<[usize; 2]>, Vec<String>);
+
+/// Follows the bifurcation curves of a finished map. Returns the tables, and how many pairs of cells have a curve between them and are
+/// borders of basins; none if only some curves were searched.
+#[pyfunction]
+#[pyo3(signature = (folder, kinds, word, place, longest, most_curves, most_points, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "they are those of the program")]
+pub(crate) fn curves(
+    py: Python<'_>,
+    folder: PathBuf,
+    kinds: Vec<String>,
+    word: Option<&str>,
+    place: Option<String>,
+    longest: u32,
+    most_curves: usize,
+    most_points: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<CurveTables> {
+    let kind = |name: &String| {
+        let list = || Kind::NAMES.join(", ");
+        Kind::named(name)
+            .ok_or_else(|| Problem::scene(format!("kinds: there is no `{name}`; the kinds are {}", list())))
+    };
+    let kinds = kinds.iter().map(kind).collect::<Result<Vec<_>, _>>()?;
+    let word =
+        word.map(|text| text.parse::<Word>().map_err(|error| Problem::scene(format!("word: {error}"))));
+    let word = word.transpose()?;
+    worker::run(py, progress, move |watch| {
+        let observer = Collector::new(watch);
+        let job = CurvesJob::open(&folder, &observer)?;
+        let from = place.map(|text| CurvesJob::place(job.scene(), &text)).transpose()?;
+        let search = Search { longest, kinds: &kinds, word: word.as_ref(), from, most_curves, most_points };
+        let found = job.find(&search, &|done, count| observer.progress(done, count), watch.halt());
+        if watch.is_halted() {
+            return Ok(None);
+        }
+        let pairs = found.pairs.map(|pairs| [pairs.explained, pairs.basins]);
+        Ok(Some((in_memory::curves(job.scene(), &found)?, pairs, observer.lines())))
     })
 }
 

@@ -28,7 +28,7 @@ mod _native {
         bifurcation::bifurcation,
         devices::devices,
         explore::explore_page,
-        finished::{check_folder, compare, manifest, validate},
+        finished::{check_folder, compare, curves, manifest, validate},
         map::{colors, map},
         model::{Model, models},
         orbit::{Orbit, orbit},

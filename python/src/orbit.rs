@@ -36,7 +36,7 @@ impl Orbit {
 impl Orbit {
     /// Returns the JSON object that `orbit --json` prints.
     fn json(&self) -> String {
-        to_json(&*self.on_cycle(), &self.orbit, None)
+        to_json(&*self.on_cycle(), &self.orbit, None, None)
     }
 
     /// Largest Lyapunov exponent. JSON cannot tell that of a superstable cycle, which is minus infinity.

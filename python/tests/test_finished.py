@@ -55,6 +55,28 @@ def test_a_validation_is_the_programs(program: Program, tmp_path: Path) -> None:
         rm.validate(tmp_path / "python", samples=0)
 
 
+def test_curves_are_the_programs(program: Program, tmp_path: Path) -> None:
+    axes = {"e": (0.5, 0.7, 8), "omega": (5.0, 6.0, 8), "engine": "cpu", "progress": False}
+    rm.map(rm.gear_pair(), **axes, quantities=["class", "symmetric"], out=tmp_path / "map")
+    program("curves", tmp_path / "map", "--kind", "pitchfork,grazing", "--out", tmp_path / "curves", "--quiet")
+    found = rm.curves(tmp_path / "map", kinds=["pitchfork", "grazing"])
+    assert set(found.points["kind"]) == {"pitchfork", "grazing"}
+    for name, table in (("curves", found.points), ("curve_points", found.meetings), ("unexplained", found.unexplained)):
+        expected = pd.read_csv(tmp_path / f"curves/{name}.csv", float_precision="round_trip")
+        assert_same_columns({column: expected[column] for column in expected}, table)
+    assert json.loads((tmp_path / "curves/manifest.json").read_text())["pairs"] is found.explained is None
+    whole = rm.curves(tmp_path / "map")
+    assert whole.explained and whole.basins is not None and len(whole.points) > len(found.points)
+    near = rm.curves(tmp_path / "map", "pitchfork", word="36", at={"e": 0.5, "omega": 5.6})
+    assert set(near.points["kind"]) == {"pitchfork"}
+    with pytest.raises(rm.SceneError, match="word: `138` is no word"):
+        rm.curves(tmp_path / "map", word="138")
+    with pytest.raises(rm.SceneError, match="kinds: there is no `hopf`; the kinds are fold, "):
+        rm.curves(tmp_path / "map", kinds=["hopf"])
+    with pytest.raises(rm.SceneError, match="longest = 0: it must be a whole number from 1 to 64"):
+        rm.curves(tmp_path / "map", longest=0)
+
+
 def test_mismatches_have_a_row_per_field(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     differences = [{"field": "class", "map": "chaotic", "judge": "periodic"}, {"field": "period", "map": None, "judge": 3}]
     cell = {"id": 7, "i": 1, "j": 1, "values": {"e": 0.6, "omega": 3.5}, "differences": differences}

@@ -64,6 +64,7 @@ def calls(name: str) -> dict[str, Callable[[], object]]:
         "plot": lambda: rm.plot(rm.open("map")),
         "compare": lambda: rm.compare("map", "map").table,
         "validate": lambda: rm.validate("map", samples=2, progress=False).mismatches,
+        "curves": lambda: rm.curves("map", progress=False).points,
         "check": lambda: rm.check("map"),
     }
 

@@ -23,10 +23,11 @@ use crate::validate::{CHAOS_PERIODS, DEFAULT_SAMPLES};
 use anyhow::anyhow;
 use clap::builder::PossibleValue;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, FromArgMatches, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use rattlemap_dynamics::model::{self, Model, REST, STATE, State};
 use rattlemap_dynamics::orbit::{LONGEST_WINDOW, Settings};
+use rattlemap_dynamics::word::Word;
 
 /// Version and commit, as `--version` prints them.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("RATTLEMAP_COMMIT"), ")");
@@ -283,6 +284,16 @@ pub(crate) struct Map {
 }
 
 impl Map {
+    /// The arguments of a map that is computed, or completed, in its default folder.
+    pub(crate) fn of_scene(scene: &Path, quiet: bool) -> Map {
+        let quiet = quiet.then_some("--quiet").map(OsStr::new);
+        let given = [OsStr::new("map"), OsStr::new("--resume")].into_iter().chain(quiet);
+        let given = given.chain([OsStr::new("--"), scene.as_os_str()]);
+        let command = Map::augment_args(clap::Command::new("map"));
+        let matches = command.get_matches_from(given);
+        Map::from_arg_matches(&matches).expect("the arguments are those of the command")
+    }
+
     /// The folder to write to.
     pub(crate) fn out(&self) -> PathBuf {
         let Some(shard) = self.shard.filter(|_| self.run.out.is_none()) else { return self.run.out() };
@@ -575,6 +586,19 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "NAME=FROM:TO", allow_hyphen_values = true, requires_all = ["time", "out"],
           conflicts_with_all = ["periods", "transient", "from_start", "json"])]
     pub(crate) run_up: Option<String>,
+
+    /// Also solve the equations of the cycle that the motion reaches: state, times of events and multipliers to rounding. With --period
+    /// or --word it is the cycle of this kind that is nearest to the start, stable or not. Example: --refine --period 1
+    #[arg(long, conflicts_with_all = ["from_start", "run_up"])]
+    pub(crate) refine: bool,
+
+    /// Length of the cycle for --refine, in forcing periods [default: 1 with --word]
+    #[arg(long, value_name = "N", requires = "refine", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub(crate) period: Option<u32>,
+
+    /// Word of the cycle for --refine
+    #[arg(long, value_name = "WORD", requires = "refine")]
+    pub(crate) word: Option<Word>,
 
     /// Print a JSON object instead of a summary
     #[arg(long)]
@@ -928,40 +952,49 @@ pub(crate) struct Compare {
     pub(crate) quiet: bool,
 }
 
-/// Follow the borders between the regions of a finished map: bifurcation curves
+/// Follow the borders between the regions of a map: bifurcation curves
 ///
 /// Where neighbouring cells have different motions, the cycle of one cell is followed to the other one. A fold, a flip (period
 /// doubling), a pitchfork (loss of symmetry) or a graze on the way is the first point of a curve, which is then followed over
 /// both axes. Each point solves the equations of the cycle to rounding, and its motion was run again: it has the same events.
-/// docs/curves.md explains the kinds. Writes curves.csv (one row per
-/// point), curve_points.csv (where two conditions meet), unexplained.csv (pairs of neighbours without a curve), curves.png (the
-/// map with its curves) and manifest.json. Ctrl-C keeps the curves that are found.
+/// docs/curves.md explains the kinds. Writes curves.csv (one row per point), curve_points.csv (where two conditions meet),
+/// unexplained.csv (pairs of neighbours without a curve), curves.png (the map with its curves), report.html (the page of the map
+/// with its curves) and manifest.json. Ctrl-C keeps the curves that are found.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  \
-    rattlemap map scenes/e_omega.toml\n  \
-    rattlemap curves out/e_omega")]
+#[command(after_help = "Examples:\n  \
+    rattlemap curves scenes/e_omega.toml\n  \
+    rattlemap curves out/e_omega --kind fold,flip --word 13554622")]
 pub(crate) struct Curves {
-    /// Folder of a finished map over two parameters
-    #[arg(value_name = "DIR")]
+    /// Folder of a finished map over two parameters, or a scene: its map is computed first, in out/<scene's name>, if it is not there
+    #[arg(value_name = "DIR|SCENE")]
     pub(crate) map: PathBuf,
 
     /// Kinds of curves: fold, flip, pitchfork, grazing, meshing_grazing, meshing_border, contact_end, sticking [default: all]
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kind)]
     pub(crate) kind: Vec<Kind>,
 
+    /// Follow only cycles with this word, the order of their contacts. `rattlemap orbit` prints the word of a motion
+    #[arg(long, value_name = "WORD")]
+    pub(crate) word: Option<Word>,
+
+    /// Begin at the cycle that the map's start reaches at these values, instead of at all cells. The first curve in each direction along
+    /// both axes is followed. Example: --from e=0.55,omega=5.6
+    #[arg(long, value_name = "NAME=VALUE,NAME=VALUE")]
+    pub(crate) from: Option<String>,
+
     /// Longest cycles that are followed, in forcing periods
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub(crate) longest: u32,
 
     /// Largest number of curves
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) most_curves: u32,
 
-    /// Largest number of points of each part of a curve. A new part begins where the order of events changes
+    /// Largest number of points of each part of a curve. A new part begins where an event passes phase 0
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) most_points: u32,
 
-    /// Folder to write to [default: out/curves/<DIR's name>]
+    /// Folder to write to [default: out/curves/<name of the map or scene>]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::arguments::{Curves, figures_and_added};
+use super::arguments::{Curves, Map, figures_and_added};
 use super::console::Console;
 use super::failure::Failure;
 use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::say;
 use crate::job::curves::CurvesJob;
+use crate::job::scene_file::SceneFile;
 use crate::map::curves::{self, Kind, Search};
 use crate::store;
 use crate::store::folder::Folder;
@@ -21,25 +22,30 @@ const LISTED: usize = 4;
 
 /// Reads the map, finds its curves, and writes them.
 pub(crate) fn run(arguments: &Curves) -> Result<(), Failure> {
+    let out = arguments.out();
+    let map = if arguments.map.is_file() { make_map(arguments, &out)? } else { arguments.map.clone() };
     let clock = Instant::now();
     let interrupt = Interrupt::listen(arguments.quiet)?;
-    let job = CurvesJob::open(&arguments.map, &Console::new(arguments.quiet, "", false))?;
-    let out = arguments.out();
+    let job = CurvesJob::open(&map, &Console::new(arguments.quiet, "", false))?;
     let folder = Folder::open(&out, arguments.force)?;
     folder.prepare(store::curves::names())?;
     let search = Search {
         longest: arguments.longest,
         kinds: &arguments.kind,
+        word: arguments.word.as_ref(),
+        from: arguments.from.as_deref().map(|text| CurvesJob::place(job.scene(), text)).transpose()?,
         most_curves: arguments.most_curves as usize,
         most_points: arguments.most_points as usize,
     };
-    let progress = Progress::new(1, 0, "pairs of cells", arguments.quiet);
+    let unit = if search.from.is_some() { "directions" } else { "pairs of cells" };
+    let progress = Progress::new(1, 0, unit, arguments.quiet);
     let report = |done: usize, count: usize| progress.report(done, count.max(1));
     let found = job.find(&search, &report, interrupt.raised());
     let elapsed = clock.elapsed();
     let (cells, layers) = (job.cells(), job.layers());
     let formats = figures_and_added(&arguments.format, folder.path(), "curves");
-    let files = store::curves::write(&folder, (&cells, &layers), &found, &formats, elapsed)?;
+    let page = job.page(&layers, &found);
+    let files = store::curves::write(&folder, (&cells, &layers), (&found, &page), &formats, elapsed)?;
     let axes = [0, 1].map(|i| &*job.scene().axes()[i].parameter().name);
     progress.finish(&format!(
         "{}\n{}: {}",
@@ -56,10 +62,22 @@ pub(crate) fn run(arguments: &Curves) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Computes the map of a scene into its default folder, or completes it there. Returns the folder. `out`: the folder of the curves.
+fn make_map(arguments: &Curves, out: &Path) -> Result<PathBuf, Failure> {
+    let scene = SceneFile::map(&arguments.map).load(&[])?;
+    CurvesJob::require(&scene, &arguments.map)?;
+    arguments.from.as_deref().map(|text| CurvesJob::place(&scene, text)).transpose()?;
+    Folder::check(out, arguments.force, store::curves::names())?;
+    let map = Map::of_scene(&arguments.map, arguments.quiet);
+    super::map::run(&map)?;
+    Ok(map.out())
+}
+
 impl Curves {
     /// The folder to write to.
     fn out(&self) -> PathBuf {
-        let name = self.map.file_name().map(Path::new).unwrap_or(Path::new("map"));
+        let name = if self.map.is_file() { self.map.file_stem() } else { self.map.file_name() };
+        let name = name.map(Path::new).unwrap_or(Path::new("map"));
         self.out.clone().unwrap_or_else(|| Path::new("out/curves").join(name))
     }
 }
@@ -73,8 +91,16 @@ fn summary(found: &curves::Curves, axes: [&str; 2], seconds: f64) -> String {
     }
     let kinds: Vec<String> =
         kinds.iter().map(|(kind, [count, points])| format!("{count} {kind} ({points} points)")).collect();
-    let mut lines = vec![format!("{} curves in {seconds:.1} s: {}", found.curves.len(), kinds.join(", "))];
-    let curves::Pairs { explained, basins, unexplained } = found.pairs;
+    let (count, list) = (found.curves.len(), kinds.join(", "));
+    let mut lines = vec![match count {
+        0 => format!("no curves in {seconds:.1} s"),
+        1 => format!("1 curve in {seconds:.1} s: {list}"),
+        _ => format!("{count} curves in {seconds:.1} s: {list}"),
+    }];
+    if let Some(reason) = found.nothing.filter(|_| count == 0) {
+        lines.push(format!("from the given values: {reason}"));
+    }
+    let curves::Pairs { explained, basins, unexplained } = found.pairs.unwrap_or_default();
     let all = explained + unexplained;
     if all > 0 {
         lines.push(format!(

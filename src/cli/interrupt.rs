@@ -1,7 +1,7 @@
 //! Handles Ctrl-C and SIGTERM: the first signal asks the command to stop, the second one ends the process.
 
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use anyhow::Context;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -34,12 +34,18 @@ struct Ending {
 }
 
 impl Interrupt {
-    /// Listens to signals from now on. A second signal ends the process at once; record files stay readable.
+    /// Listens to signals from now on. A second signal ends the process at once; record files stay readable. A process that listens already
+    /// goes on with what it has received.
     ///
     /// # Errors
     /// If the operating system refuses.
     pub(super) fn listen(quiet: bool) -> Result<Interrupt, Failure> {
-        let interrupt = Interrupt::default();
+        static LISTENING: OnceLock<Interrupt> = OnceLock::new();
+        if let Some(listening) = LISTENING.get() {
+            listening.wait_for(None);
+            return Ok(listening.clone());
+        }
+        let interrupt = LISTENING.get_or_init(Interrupt::default).clone();
         for signal in [SIGINT, SIGTERM] {
             // The handler itself ends the process: the thread below may be blocked by a terminal that accepts no text.
             let raised = Arc::clone(&interrupt.raised);

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use serde_json::Value;
+
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
@@ -10,11 +12,12 @@ use crate::map::curves::{self, Curves, Search};
 use crate::map::scene::{Quantity, Scene};
 use crate::show::cells::{Cells, Survey};
 use crate::show::layers::{self, Layer};
-use crate::show::words;
+use crate::show::{report, words};
 use crate::store::finished_map::FinishedMap;
 
 /// A finished map whose curves can be found.
 pub struct CurvesJob {
+    map: FinishedMap,
     scene: Scene,
     loaded: LoadedMap,
     survey: Survey,
@@ -28,7 +31,18 @@ impl CurvesJob {
     pub fn open(dir: &Path, observer: &dyn Observer) -> Result<CurvesJob, JobError> {
         let map = FinishedMap::open_own(dir)?;
         let scene = finished::scene(&map)?;
-        let refuse = |reason: String| Err(JobError::Usage(format!("{}: {reason}", dir.display())));
+        CurvesJob::require(&scene, dir)?;
+        let mut loaded = LoadedMap::read(&map, &scene, observer)?;
+        let survey = loaded.survey();
+        Ok(CurvesJob { map, scene, loaded, survey })
+    }
+
+    /// Checks that the map of a scene can have curves. `source`: where the scene is from.
+    ///
+    /// # Errors
+    /// [`JobError`] as for [`open`](Self::open).
+    pub fn require(scene: &Scene, source: &Path) -> Result<(), JobError> {
+        let refuse = |reason: String| Err(JobError::Usage(format!("{}: {reason}", source.display())));
         if scene.axes().len() != 2 || scene.sweeps_start() {
             return refuse("curves need a map over two parameters".to_owned());
         }
@@ -42,9 +56,7 @@ impl CurvesJob {
                 "[derived] changes {derived} with {axis}, and curves change the axes alone; write the expression into the model file instead"
             ));
         }
-        let mut loaded = LoadedMap::read(&map, &scene, observer)?;
-        let survey = loaded.survey();
-        Ok(CurvesJob { scene, loaded, survey })
+        Ok(())
     }
 
     /// The map's scene.
@@ -61,6 +73,39 @@ impl CurvesJob {
     pub fn layers(&self) -> Vec<Layer> {
         let cells = self.cells();
         layers::of(&cells, &words::read(&cells))
+    }
+
+    /// What the page of the map shows, with curves.
+    pub fn page(&self, layers: &[Layer], found: &Curves) -> Value {
+        let cells = self.cells();
+        let made = self.map.manifest().provenance();
+        let mut data = report::sketched(&cells, &made, layers, &words::read(&cells), None);
+        report::add_curves(&mut data, &self.scene, found);
+        data
+    }
+
+    /// Reads values of both axes of a scene from a text `NAME=VALUE,NAME=VALUE`.
+    ///
+    /// # Errors
+    /// [`JobError`] if an axis has no value, or none within its range.
+    pub fn place(scene: &Scene, text: &str) -> Result<[f64; 2], JobError> {
+        let refuse = |reason: String| JobError::Usage(format!("--from {text}: {reason}"));
+        let mut values = [None; 2];
+        for part in text.split(',') {
+            let (name, value) =
+                part.split_once('=').ok_or_else(|| refuse(format!("`{part}` is not NAME=VALUE")))?;
+            let axes = scene.axes();
+            let at = axes.iter().position(|axis| axis.parameter().name == name.trim());
+            let at = at.ok_or_else(|| refuse(format!("the map has no axis `{}`", name.trim())))?;
+            let (value, axis) = (value.trim().parse::<f64>().ok(), &axes[at]);
+            let inside = value.filter(|value| (axis.min()..=axis.max()).contains(value));
+            let range = || format!("{} needs a number from {} to {}", name.trim(), axis.min(), axis.max());
+            values[at] = Some(inside.ok_or_else(|| refuse(range()))?);
+        }
+        match values {
+            [Some(x), Some(y)] => Ok([x, y]),
+            _ => Err(refuse("both axes need a value".to_owned())),
+        }
     }
 
     /// Finds the curves. `progress` gets the number of examined pairs of cells, and of all. What is found when `halt` is raised is kept.

@@ -14,11 +14,11 @@ use crate::map::scene::{Axis, Scene};
 use crate::record::classify::classify;
 use crate::record::{Record, Records};
 use rattlemap_dynamics::cycle::{
-    Branch, BranchEnd, BranchLimits, BranchPoint, Condition, CycleError, Itinerary, Seed, Special, curve,
-    follow_on,
+    Branch, BranchEnd, BranchLimits, BranchPoint, Condition, CycleError, Itinerary, Seed, Special,
+    SpecialPoint, curve, follow_on,
 };
 use rattlemap_dynamics::machine::Touched;
-use rattlemap_dynamics::model::State;
+use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{Class, analyse};
 use rattlemap_dynamics::word::Word;
@@ -31,7 +31,13 @@ const MOST_POINTS: usize = 30;
 const STEPS_BEYOND: [f64; 3] = [0.01, 1e-6, 0.1];
 
 /// Largest step of a curve, relative to the axes.
-const LARGEST_STEP: f64 = 0.02;
+const LARGEST_STEP: f64 = 0.05;
+
+/// Number of straight pieces between two points of a curve. They are parts of a cubic, and their error is below [`ON_CURVE`].
+const PIECES: usize = 8;
+
+/// Largest length of the slopes at two points, relative to their distance, with which a cubic connects them.
+const LONGEST_SLOPE: f64 = 3.0;
 
 /// Largest distance of a seed from a curve that it lies on, relative to the axes.
 const ON_CURVE: f64 = 1e-4;
@@ -61,7 +67,7 @@ named! {
         Grazing = "grazing",
         /// Motion in lasting contact touches the wall of its contact.
         MeshingGrazing = "meshing_grazing",
-        /// The force of a contact touches 0.
+        /// The force of a contact touches 0, or an impact is at the limit of those after which contact lasts.
         MeshingBorder = "meshing_border",
         /// The motion without events touches a wall.
         ContactEnd = "contact_end",
@@ -73,17 +79,36 @@ named! {
 impl Kind {
     /// Returns the kind of the curve of a seed; none of a border between pieces of a smooth law.
     fn of(seed: &Seed) -> Option<Kind> {
-        Some(match (seed.condition, seed.touched()) {
-            (Condition::Fold, _) => Kind::Fold,
-            (Condition::Flip, _) if seed.is_half() => Kind::Pitchfork,
-            (Condition::Flip, _) => Kind::Flip,
-            (Condition::Touch, Some(Touched::Wall)) if seed.events() == 0 => Kind::ContactEnd,
-            (Condition::Touch, Some(Touched::Wall)) => Kind::Grazing,
-            (Condition::Touch, Some(Touched::Contact)) => Kind::MeshingGrazing,
-            (Condition::Touch, Some(Touched::Force)) => Kind::MeshingBorder,
-            (Condition::Touch, Some(Touched::Friction)) => Kind::Sticking,
-            (Condition::Touch, Some(Touched::Piece) | None) => return None,
-        })
+        match seed.condition {
+            Condition::Fold => Some(Kind::Fold),
+            Condition::Flip if seed.is_half() => Some(Kind::Pitchfork),
+            Condition::Flip => Some(Kind::Flip),
+            Condition::Touch if seed.events() == 0 && seed.touched() == Some(Touched::Wall) => {
+                Some(Kind::ContactEnd)
+            }
+            Condition::Touch => Kind::touching(seed.touched()?),
+        }
+    }
+
+    /// Returns the kind of the curve on which a motion with events touches something.
+    fn touching(touched: Touched) -> Option<Kind> {
+        match touched {
+            Touched::Wall => Some(Kind::Grazing),
+            Touched::Contact => Some(Kind::MeshingGrazing),
+            Touched::Force | Touched::Limit => Some(Kind::MeshingBorder),
+            Touched::Friction => Some(Kind::Sticking),
+            Touched::Piece => None,
+        }
+    }
+
+    /// Returns the kind of the other curve at a special point of a curve; none if the sequence of flights changes in another way.
+    fn meeting(special: &SpecialPoint) -> Option<Kind> {
+        match special.kind {
+            Special::Fold => Some(Kind::Fold),
+            Special::Flip => Some(Kind::Flip),
+            Special::Pitchfork => Some(Kind::Pitchfork),
+            Special::Grazing | Special::Border => Kind::touching(special.meets?),
+        }
     }
 }
 
@@ -94,6 +119,8 @@ pub struct CurvePoint {
     pub values: [f64; 2],
     /// Length of the curve from its first point, in scaled unknowns.
     pub arclength: f64,
+    /// Changes of the values of the axes per arclength.
+    pub slope: [f64; 2],
     /// State at phase 0.
     pub state: State,
     /// Floquet multipliers, largest modulus first: of half a cycle that is its own mirror image, those of the reflected map.
@@ -107,8 +134,8 @@ pub struct CurvePoint {
 pub struct Meeting {
     /// Number of the curve, from 1.
     pub curve: usize,
-    /// The other condition.
-    pub with: Special,
+    /// The kind of the other condition; none if the sequence of flights changes in another way.
+    pub with: Option<Kind>,
     /// The cycle.
     pub at: CurvePoint,
 }
@@ -126,6 +153,33 @@ pub struct Curve {
     pub points: Vec<CurvePoint>,
     /// Why it ends, at the first and at the last point.
     pub ends: [&'static str; 2],
+}
+
+impl CurvePoint {
+    /// Returns values of the axes on the way to the next point of a curve, and at it, from the cubic that has the slopes of both.
+    pub fn way_to(&self, next: &CurvePoint) -> impl Iterator<Item = [f64; 2]> {
+        let apart = next.arclength - self.arclength;
+        let chord = [0, 1].map(|i| next.values[i] - self.values[i]);
+        // The ranges of the axes may differ by orders of magnitude: each slope is compared with the larger of both ends' slopes.
+        let scale = |i: usize| self.slope[i].abs().max(next.slope[i].abs()).max(f64::MIN_POSITIVE);
+        let length = |of: [f64; 2]| (of[0] / scale(0)).hypot(of[1] / scale(1));
+        let is_smooth = apart * length(self.slope).min(length(next.slope)) <= LONGEST_SLOPE * length(chord);
+        let at = move |t: f64, i: usize| {
+            let (from, to) = (self.values[i], next.values[i]);
+            let [first, last] = [self.slope[i], next.slope[i]].map(|slope| slope * apart - (to - from));
+            let line = from + t * (to - from);
+            if is_smooth { line + t * (1.0 - t) * ((1.0 - t) * first - t * last) } else { line }
+        };
+        (1..=PIECES).map(move |k| [0, 1].map(|i| at(k as f64 / PIECES as f64, i)))
+    }
+}
+
+impl Curve {
+    /// Returns values of the axes along the curve: its points, and points of cubics between them.
+    pub fn line(&self) -> Vec<[f64; 2]> {
+        let first = self.points.first().map(|point| point.values);
+        first.into_iter().chain(self.points.windows(2).flat_map(|pair| pair[0].way_to(&pair[1]))).collect()
+    }
 }
 
 /// Pairs of neighbouring cells with different motions.
@@ -155,12 +209,14 @@ pub struct Curves {
     pub curves: Vec<Curve>,
     /// Points where two conditions meet.
     pub meetings: Vec<Meeting>,
-    /// What lies between neighbouring cells.
-    pub pairs: Pairs,
+    /// What lies between neighbouring cells; none if only some curves are searched.
+    pub pairs: Option<Pairs>,
     /// Pairs without a curve.
     pub unexplained: Vec<Unexplained>,
     /// Seeds that could not be followed, with their kinds and places.
     pub failures: Vec<(Kind, [f64; 2], String)>,
+    /// Why a search from given values met nothing in a direction.
+    pub nothing: Option<&'static str>,
 }
 
 /// What is searched for.
@@ -170,10 +226,21 @@ pub struct Search<'a> {
     pub longest: u32,
     /// Kinds of curves; all if empty.
     pub kinds: &'a [Kind],
+    /// Word of the cycles that are followed; none follows all.
+    pub word: Option<&'a Word>,
+    /// Values of the axes at which curves are searched: along both axes, from the cycle there. None searches between the map's cells.
+    pub from: Option<[f64; 2]>,
     /// Largest number of curves.
     pub most_curves: usize,
     /// Largest number of points of each part of a curve.
     pub most_points: usize,
+}
+
+impl Search<'_> {
+    /// Whether all curves between cells are searched. Otherwise the share of pairs with a curve says nothing.
+    fn is_whole(&self) -> bool {
+        self.kinds.is_empty() && self.word.is_none() && self.from.is_none()
+    }
 }
 
 /// Runs of two neighbouring cells from the same start, and the axis along which the cells differ.
@@ -181,6 +248,24 @@ pub struct Search<'a> {
 struct Pair {
     cells: [usize; 2],
     axis: usize,
+}
+
+/// A seed that a branch has met.
+struct Met {
+    seed: Seed,
+    /// The model at the start of the branch, and the axis of the branch.
+    model: Box<dyn Model>,
+    axis: usize,
+}
+
+/// Where a branch of cycles begins and ends.
+struct Course {
+    model: Box<dyn Model>,
+    start: State,
+    axis: usize,
+    end: f64,
+    /// First, least and largest step, relative to the course.
+    steps: [f64; 3],
 }
 
 /// What the cycle of one cell meets on its way to the other one.
@@ -203,9 +288,11 @@ struct Finder<'a> {
     halt: &'a AtomicBool,
     /// Pairs of cells that a curve passes between.
     crossed: HashSet<(usize, usize)>,
-    /// How many cycles of a word were followed beyond their basins, along an axis in a direction.
-    followed: HashMap<(u64, usize, bool), usize>,
+    /// How many cycles of a word and a period were followed beyond their basins, along an axis in a direction.
+    followed: HashMap<(u64, u32, usize, bool), usize>,
     found: Curves,
+    /// The lines of the curves that are found.
+    lines: Vec<Vec<[f64; 2]>>,
 }
 
 /// Finds the bifurcation curves of a finished map over two parameters. `progress` gets the number of pairs that are done, and of all.
@@ -235,6 +322,7 @@ pub fn curves(
         crossed: HashSet::new(),
         followed: HashMap::new(),
         found: Curves::default(),
+        lines: Vec::new(),
     };
     finder.run(progress);
     finder.found
@@ -294,9 +382,15 @@ impl Finder<'_> {
     }
 
     fn run(&mut self, progress: &dyn Fn(usize, usize)) {
+        if let Some(values) = self.search.from {
+            self.run_from(values, progress);
+            return;
+        }
         let mut pairs = self.pairs();
         let count = pairs.len();
         Random::new(1).draw(&mut pairs, count);
+        // Pairs of two cycles say more about curves than the borders of chaos.
+        pairs.sort_by_cached_key(|pair| !self.is_of_cycles(pair));
         let mut undecided = Vec::new();
         for (nth, batch) in pairs.chunks(BATCH).enumerate() {
             if self.halt.load(Ordering::Relaxed) {
@@ -312,19 +406,52 @@ impl Finder<'_> {
             let mut seeds = Vec::new();
             for ((pair, side), way) in continuing.iter().zip(beyond) {
                 let Way::Meets(met) = way else { continue };
-                seeds.extend(met.into_iter().map(|seed| (seed, pair.cells[usize::from(*side)], pair.axis)));
+                let cell = pair.cells[usize::from(*side)];
+                seeds.extend(met.into_iter().map(|seed| self.met(seed, cell, pair.axis)));
             }
             for (pair, ways) in open.iter().zip(ways) {
                 for (way, from) in ways.iter().zip(pair.cells) {
                     let Way::Meets(met) = way else { continue };
-                    seeds.extend(met.iter().map(|seed| (seed.clone(), from, pair.axis)));
+                    seeds.extend(met.iter().map(|seed| self.met(seed.clone(), from, pair.axis)));
                 }
                 undecided.push((*pair, ways));
             }
             self.trace(seeds);
         }
         progress(count, count);
-        self.tally(&pairs, undecided);
+        if self.search.is_whole() {
+            self.tally(&pairs, undecided);
+        }
+    }
+
+    /// Searches along both axes, in both directions, from the cycle at given values.
+    fn run_from(&mut self, values: [f64; 2], progress: &dyn Fn(usize, usize)) {
+        let mut model = self.plan.model(0);
+        (0..2).for_each(|i| model.assign(self.parameters[i].0, values[i]));
+        let (start, axes) = (self.plan.start(0, self.records), self.scene.axes());
+        for (nth, (axis, rises)) in [(0, false), (0, true), (1, false), (1, true)].into_iter().enumerate() {
+            progress(nth, 4);
+            let end = if rises { axes[axis].max() } else { axes[axis].min() };
+            let course = Course { model: model.clone_model(), start, axis, end, steps: STEPS_BEYOND };
+            match self.follow(course, None) {
+                Way::Meets(met) => {
+                    let of = |seed| Met { seed, model: model.clone_model(), axis };
+                    self.trace(met.into_iter().map(of).collect());
+                }
+                Way::Fails(reason) => self.found.nothing = Some(reason),
+                Way::Continues => {}
+            }
+        }
+        progress(4, 4);
+    }
+
+    fn met(&self, seed: Seed, cell: usize, axis: usize) -> Met {
+        Met { seed, model: self.plan.model(cell as u32), axis }
+    }
+
+    /// Whether both cells of a pair have short cycles.
+    fn is_of_cycles(&self, pair: &Pair) -> bool {
+        pair.cells.iter().all(|&cell| self.is_short(self.class(cell).0))
     }
 
     fn is_crossed(&self, pair: &Pair) -> bool {
@@ -336,11 +463,7 @@ impl Finder<'_> {
     fn way(&self, pair: &Pair, swapped: bool, beyond: bool) -> Way {
         let [from, to] = if swapped { [pair.cells[1], pair.cells[0]] } else { pair.cells };
         let (class, _) = self.class(from);
-        let Class::Periodic { period } = class else { return Way::Fails("no cycle") };
-        if !self.is_short(class) {
-            return Way::Fails("the cycle is long");
-        }
-        let (parameter, axis) = (self.parameters[pair.axis].0, &self.scene.axes()[pair.axis]);
+        let axis = &self.scene.axes()[pair.axis];
         let value = |cell: usize| axis.value(self.plan.indices(cell as u32)[pair.axis]);
         let rises = value(to) > value(from);
         let end = match (beyond, rises) {
@@ -348,14 +471,32 @@ impl Finder<'_> {
             (true, false) => axis.min(),
             (true, true) => axis.max(),
         };
-        let range = [value(from).min(end), value(from).max(end)];
-        let mut model = self.plan.model(from as u32);
-        let start = self.plan.start(from as u32, self.records);
+        let (model, start) = (self.plan.model(from as u32), self.plan.start(from as u32, self.records));
+        let steps = if beyond { STEPS_BEYOND } else { STEPS };
+        self.follow(Course { model, start, axis: pair.axis, end, steps }, Some(class))
+    }
+
+    /// Follows the cycle at the start of a course, whose class may be known.
+    fn follow(&self, course: Course, known: Option<Class>) -> Way {
+        if known.is_some_and(|class| !self.is_short(class)) {
+            return Way::Fails("no short cycle");
+        }
+        let Course { mut model, start, axis, end, steps } = course;
+        let parameter = self.parameters[axis].0;
+        let value = model.value(parameter);
+        let (range, rises) = ([value.min(end), value.max(end)], end > value);
         let Ok(orbit) = analyse(&*model, start, &self.scene.orbit_settings()) else {
             return Way::Fails("the model has no motion");
         };
-        if orbit.class != class {
+        if known.is_some_and(|class| class != orbit.class) {
             return Way::Fails("the reference finds another class");
+        }
+        let Class::Periodic { period } = orbit.class else { return Way::Fails("no cycle") };
+        if !self.is_short(orbit.class) {
+            return Way::Fails("no short cycle");
+        }
+        if self.search.word.is_some_and(|word| *word != orbit.word) {
+            return Way::Fails("the cycle has another word");
         }
         if let Some(time) = orbit.cycle_time {
             model.set_cycle_time(time);
@@ -364,7 +505,6 @@ impl Finder<'_> {
         let Ok((itinerary, seed)) = Itinerary::of(&*model, &orbit.strobe, half_periods) else {
             return Way::Fails("the motion ends");
         };
-        let steps = if beyond { STEPS_BEYOND } else { STEPS };
         let limits = BranchLimits { steps, points: MOST_POINTS, to_curve: true, halt: self.halt };
         let parts = match follow_on(&*model, &itinerary, &seed, parameter, (range, rises), &limits) {
             Ok(parts) => parts,
@@ -376,7 +516,7 @@ impl Finder<'_> {
             .collect();
         let last = parts.last().and_then(|part| Some((part, part.points.last()?)));
         let arrives = last.is_some_and(|(part, point)| {
-            let is_there = (point.value - end).abs() < (point.value - value(from)).abs();
+            let is_there = (point.value - end).abs() < (point.value - value).abs();
             part.end == BranchEnd::Range && is_there && point.is_stable()
         });
         match (arrives, seeds.is_empty()) {
@@ -392,8 +532,11 @@ impl Finder<'_> {
         let mut all = Vec::new();
         for (pair, ways) in open.iter().zip(ways) {
             for (side, way) in ways.iter().enumerate() {
-                let hash = self.class(pair.cells[side]).1.word_hash;
-                let count = self.followed.entry((hash, pair.axis, side == 1)).or_default();
+                let (class, record) = self.class(pair.cells[side]);
+                // Cycles of different periods may have the same word.
+                let Class::Periodic { period } = class else { continue };
+                let key = (record.word_hash, period, pair.axis, side == 1);
+                let count = self.followed.entry(key).or_default();
                 if matches!(way, Way::Continues) && *count < BEYOND_BASINS {
                     *count += 1;
                     all.push((*pair, side == 1));
@@ -403,25 +546,25 @@ impl Finder<'_> {
         all
     }
 
-    /// Follows the curves of seeds that lie on none yet. A seed has the cell of its branch, and the axis along which the branch was followed.
-    fn trace(&mut self, seeds: Vec<(Seed, usize, usize)>) {
-        let mut open: Vec<(Kind, Seed, usize, usize)> = seeds
+    /// Follows the curves of seeds that lie on none yet.
+    fn trace(&mut self, seeds: Vec<Met>) {
+        let mut open: Vec<(Kind, Met)> = seeds
             .into_iter()
-            .filter_map(|(seed, cell, axis)| Some((Kind::of(&seed)?, seed, cell, axis)))
+            .filter_map(|met| Some((Kind::of(&met.seed)?, met)))
             .filter(|(kind, ..)| self.search.kinds.is_empty() || self.search.kinds.contains(kind))
             .collect();
         while !open.is_empty()
             && self.found.curves.len() < self.search.most_curves
             && !self.halt.load(Ordering::Relaxed)
         {
-            open.retain(|(kind, seed, cell, axis)| {
-                let place = self.place(seed, *cell, *axis);
+            open.retain(|(kind, met)| {
+                let place = self.place(met);
                 !self.is_on_curve(*kind, place) && !self.has_failed(*kind, place)
             });
             // Seeds of the same kind and word are often on the same curve, so only one of them is followed at a time.
             let (mut words, mut rest) = (Vec::new(), Vec::new());
             for seed in std::mem::take(&mut open) {
-                let word = (seed.0, seed.1.word.clone());
+                let word = (seed.0, seed.1.seed.word.clone());
                 if open.len() == SEEDS || words.contains(&word) {
                     rest.push(seed);
                 } else {
@@ -437,19 +580,26 @@ impl Finder<'_> {
             };
             let traced: Vec<_> = open
                 .par_iter()
-                .map(|(_, seed, cell, axis)| {
-                    let model = self.plan.model(*cell as u32);
-                    curve(&*model, seed, self.parameters[*axis].0, self.parameters, &limits)
+                .map(|(_, Met { seed, model, axis })| {
+                    let arm = |forward: bool| {
+                        let parameter = self.parameters[*axis].0;
+                        curve(&**model, seed, parameter, (self.parameters, forward), &limits)
+                    };
+                    let (first, second) = rayon::join(|| arm(false), || arm(true));
+                    let (first, second) = (first?, second?);
+                    // A closed curve has all its points already.
+                    let is_closed = first.last().is_some_and(|part| part.end == BranchEnd::Closed);
+                    Ok::<_, CycleError>([first, if is_closed { Vec::new() } else { second }])
                 })
                 .collect();
-            for ((kind, seed, cell, axis), arms) in open.iter().zip(traced) {
-                let place = self.place(seed, *cell, *axis);
+            for ((kind, met), arms) in open.iter().zip(traced) {
+                let place = self.place(met);
                 match arms {
                     Ok(_) if self.is_on_curve(*kind, place) => {}
                     Ok(arms) if arms.iter().flatten().all(|part| part.points.len() < 2) => {
                         self.found.failures.push((*kind, place, "the curve has no second point".to_owned()));
                     }
-                    Ok(arms) => self.add(*kind, seed, &arms),
+                    Ok(arms) => self.add(*kind, &met.seed, &arms),
                     Err(error) => self.found.failures.push((*kind, place, error.to_string())),
                 }
             }
@@ -458,10 +608,8 @@ impl Finder<'_> {
     }
 
     /// Returns the values of the axes at a seed.
-    fn place(&self, seed: &Seed, cell: usize, axis: usize) -> [f64; 2] {
-        let indices = self.plan.indices(cell as u32);
-        let value = |i: usize| if i == axis { seed.value() } else { self.scene.axes()[i].value(indices[i]) };
-        [value(0), value(1)]
+    fn place(&self, Met { seed, model, axis }: &Met) -> [f64; 2] {
+        [0, 1].map(|i| if i == *axis { seed.value() } else { model.value(self.parameters[i].0) })
     }
 
     /// Returns the values of the axes relative to their ranges.
@@ -475,15 +623,16 @@ impl Finder<'_> {
 
     fn is_on_curve(&self, kind: Kind, place: [f64; 2]) -> bool {
         let at = self.relative(place);
-        let near = |pair: &[CurvePoint]| {
-            let [a, b] = [self.relative(pair[0].values), self.relative(pair[1].values)];
+        let near = |pair: &[[f64; 2]]| {
+            let [a, b] = [self.relative(pair[0]), self.relative(pair[1])];
             let (along, to) = ([b[0] - a[0], b[1] - a[1]], [at[0] - a[0], at[1] - a[1]]);
             let square = along[0] * along[0] + along[1] * along[1];
             let share = if square > 0.0 { (to[0] * along[0] + to[1] * along[1]) / square } else { 0.0 }
                 .clamp(0.0, 1.0);
             (to[0] - share * along[0]).hypot(to[1] - share * along[1]) < ON_CURVE
         };
-        self.found.curves.iter().any(|curve| curve.kind == kind && curve.points.windows(2).any(near))
+        let curves = self.found.curves.iter().zip(&self.lines).filter(|(curve, _)| curve.kind == kind);
+        curves.into_iter().any(|(_, line)| line.windows(2).any(near))
     }
 
     /// Whether a seed of the same kind in the same cell could not be followed.
@@ -496,18 +645,21 @@ impl Finder<'_> {
     /// Adds a curve from its two arms.
     fn add(&mut self, kind: Kind, seed: &Seed, arms: &[Vec<Branch>; 2]) {
         let number = self.found.curves.len() + 1;
+        let ranges = self.parameters.map(|(_, range)| range);
         let mut points = Vec::new();
         let length: f64 = arms[0].iter().map(|part| part.length()).sum();
         for (arm, sign) in arms.iter().zip([-1.0, 1.0]) {
             let mut before = 0.0;
             let mut found = Vec::new();
             for part in arm {
-                let of = |point: &BranchPoint| curve_point(point, length + sign * (before + point.arclength));
+                let of = |point: &BranchPoint| {
+                    curve_point(point, (ranges, sign), length + sign * (before + point.arclength))
+                };
                 found.extend(part.points.iter().map(of));
                 for special in &part.special {
                     self.found.meetings.push(Meeting {
                         curve: number,
-                        with: special.kind,
+                        with: Kind::meeting(special),
                         at: of(&special.at),
                     });
                 }
@@ -520,19 +672,19 @@ impl Finder<'_> {
             }
             points.extend(found);
         }
-        let ends = arms.each_ref().map(|arm| arm.last().map_or("", |part| reason(&part.end)));
-        self.cross(&points);
+        let ends = arms.each_ref().map(|arm| arm.last().map_or("", reason));
         let (word, period) = (seed.word.clone(), seed.period());
-        self.found.curves.push(Curve { kind, word, period, points, ends });
+        let curve = Curve { kind, word, period, points, ends };
+        let line = curve.line();
+        self.cross(&line);
+        self.lines.push(line);
+        self.found.curves.push(curve);
     }
 
     /// Marks the pairs of cells that a curve passes between.
-    fn cross(&mut self, points: &[CurvePoint]) {
-        let place = |point: &CurvePoint| {
-            let of = |i: usize| cell_place(&self.scene.axes()[i], point.values[i]);
-            [of(0), of(1)]
-        };
-        let places: Vec<[f64; 2]> = points.iter().map(place).collect();
+    fn cross(&mut self, line: &[[f64; 2]]) {
+        let place = |values: &[f64; 2]| [0, 1].map(|i| cell_place(&self.scene.axes()[i], values[i]));
+        let places: Vec<[f64; 2]> = line.iter().map(place).collect();
         let [columns, rows] = self.plan.counts();
         for pair in places.windows(2) {
             let [a, b] = [pair[0], pair[1]];
@@ -558,11 +710,10 @@ impl Finder<'_> {
 
     /// Counts the pairs of two short cycles.
     fn tally(&mut self, pairs: &[Pair], undecided: Vec<(Pair, [Way; 2])>) {
-        let of_cycles = |pair: &Pair| pair.cells.iter().all(|&cell| self.is_short(self.class(cell).0));
         let ways: HashMap<(usize, usize), [Way; 2]> =
             undecided.into_iter().map(|(pair, ways)| ((pair.cells[0], pair.cells[1]), ways)).collect();
         let (mut tally, mut unexplained) = (Pairs::default(), Vec::new());
-        for pair in pairs.iter().filter(|pair| of_cycles(pair)) {
+        for pair in pairs.iter().filter(|pair| self.is_of_cycles(pair)) {
             let found = ways.get(&(pair.cells[0], pair.cells[1]));
             if self.is_crossed(pair) {
                 tally.explained += 1;
@@ -582,12 +733,12 @@ impl Finder<'_> {
                 unexplained.push(Unexplained { cells: pair.cells.map(place), reason: reason.unwrap_or("") });
             }
         }
-        (self.found.pairs, self.found.unexplained) = (tally, unexplained);
+        (self.found.pairs, self.found.unexplained) = (Some(tally), unexplained);
     }
 }
 
 /// Returns the place of a value on an axis, in cells from the first centre.
-fn cell_place(axis: &Axis, value: f64) -> f64 {
+pub fn cell_place(axis: &Axis, value: f64) -> f64 {
     let (mut low, mut high) = (0, axis.count() - 1);
     while high - low > 1 {
         let middle = (low + high) / 2;
@@ -597,11 +748,13 @@ fn cell_place(axis: &Axis, value: f64) -> f64 {
     low as f64 + (value - from) / (to - from)
 }
 
-fn curve_point(point: &BranchPoint, arclength: f64) -> CurvePoint {
-    let values = point.solution.values();
+/// `sign`: whether the arclength of the curve rises or falls along the branch.
+fn curve_point(point: &BranchPoint, (ranges, sign): ([[f64; 2]; 2], f64), arclength: f64) -> CurvePoint {
+    let (values, heading) = (point.solution.values(), point.heading(2));
     CurvePoint {
         values: [values[values.len() - 2], values[values.len() - 1]],
         arclength,
+        slope: [0, 1].map(|i| sign * heading[i] * (ranges[i][1] - ranges[i][0])),
         state: point.solution.state(),
         multipliers: point.multipliers.clone(),
         stable: point.is_stable(),
@@ -609,10 +762,16 @@ fn curve_point(point: &BranchPoint, arclength: f64) -> CurvePoint {
 }
 
 /// Describes why a curve ends.
-fn reason(end: &BranchEnd) -> &'static str {
-    match end {
+fn reason(part: &Branch) -> &'static str {
+    match &part.end {
         BranchEnd::Range => "border of the map",
-        BranchEnd::Border => "the sequence of flights changes",
+        BranchEnd::Border => match part.special.last().and_then(Kind::meeting) {
+            Some(Kind::Grazing) => "another wall is touched",
+            Some(Kind::MeshingGrazing) => "a contact touches its wall",
+            Some(Kind::MeshingBorder) => "another contact begins or ends",
+            Some(Kind::Sticking) => "sticking begins or ends",
+            _ => "the sequence of flights changes",
+        },
         BranchEnd::Failed(CycleError::Diverges) => "Newton's method fails at the shortest step",
         BranchEnd::Failed(_) => "the model has no motion beyond",
         BranchEnd::Closed => "closed",

@@ -7,13 +7,19 @@ use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::parameters::{self, Parameters};
+use rattlemap_dynamics::cycle::Cycle;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Event, History, Orbit, SlipPoint};
 
 /// Returns the orbit of a model as a JSON object of several lines. Numbers are the shortest decimals that read back as the
 /// same number; numbers that are not finite become null.
-pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> String {
-    let properties = json!({
+pub fn to_json(
+    model: &dyn Model,
+    orbit: &Orbit,
+    instant: Option<Instant>,
+    refined: Option<&Cycle>,
+) -> String {
+    let mut properties = json!({
         "class": orbit.class.name(),
         "period": names::period(orbit.class),
         "lyapunov": orbit.lyapunov,
@@ -30,6 +36,16 @@ pub fn to_json(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         "strobe": components(model, &orbit.strobe),
         "events": events(model, &orbit.events, &orbit.slips),
     });
+    if let Some(cycle) = refined {
+        properties["refined"] = json!({
+            "period": cycle.periods,
+            "word": cycle.word.time_order(),
+            "stable": cycle.is_stable(),
+            "floquet": cycle.multipliers,
+            "strobe": components(model, &cycle.solution.state()),
+            "event_times": cycle.event_times(),
+        });
+    }
     object(model, properties, instant)
 }
 

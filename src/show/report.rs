@@ -19,10 +19,11 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
+use crate::map::curves::{Curves, cell_place};
 use crate::map::scene::{Axis, Quantity, Rule, Scale, Scene, Target};
 use crate::map::schedule::{Audit, Refined};
 use crate::model_file::{FileModel, letters_in_words};
-use crate::record::Record;
+use crate::record::{Record, Spelling};
 use crate::show::cells::{Cells, Finished, Row, Source};
 use crate::show::color::{Color, hex};
 use crate::show::error::WriteError;
@@ -140,6 +141,37 @@ pub fn data(
         data["starts"] = packed("f64", &starts);
     }
     data
+}
+
+/// Returns the position of a value on an axis, in cells. Cell i spans i to i + 1.
+fn place(axis: &Axis, value: f64) -> f64 {
+    let share = (value / axis.min()).ln() / (axis.max() / axis.min()).ln();
+    0.5 + match axis.scale() {
+        Scale::Log => share * (axis.count() - 1) as f64,
+        _ => cell_place(axis, value),
+    }
+}
+
+/// Adds bifurcation curves to the data of the page: what each curve is, and the points of all curves in one array, in cells.
+pub fn add_curves(data: &mut Value, scene: &Scene, found: &Curves) {
+    let (mut list, mut places, mut stable) = (Vec::new(), Vec::<f32>::new(), Vec::<u8>::new());
+    for curve in &found.curves {
+        let line = curve.line();
+        let pieces = (line.len() - 1) / (curve.points.len() - 1).max(1);
+        list.push(json!({
+            "kind": curve.kind.name().replace('_', " "),
+            "color": hex(figure::map::curve_color(curve.kind)),
+            "period": curve.period,
+            "word": Spelling::new(&curve.word).text(),
+            "count": line.len(),
+        }));
+        for (nth, values) in line.iter().enumerate() {
+            places.extend([0, 1].map(|i| place(&scene.axes()[i], values[i]) as f32));
+            stable.push(curve.points[nth.div_ceil(pieces.max(1))].stable.into());
+        }
+    }
+    data["curves"] =
+        json!({ "list": list, "places": packed("f32", &places), "stable": packed("u8", &stable) });
 }
 
 /// Writes the page.

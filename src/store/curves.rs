@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::map::curves::{Curves, Kind};
 use crate::map::scene::Format;
@@ -12,11 +12,12 @@ use crate::show::cells::Cells;
 use crate::show::drawing::write_figure;
 use crate::show::layers::Layer;
 use crate::show::table::curve_tables;
-use crate::show::{figure, names};
+use crate::show::{figure, names, report};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{Head, MANIFEST, joined};
+use crate::store::map::REPORT;
 
 const CURVES: &str = "curves.csv";
 const POINTS: &str = "curve_points.csv";
@@ -26,17 +27,19 @@ static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figure
 
 /// Names of all files that the command may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, CURVES, POINTS, UNEXPLAINED].into_iter().chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+    [MANIFEST, CURVES, POINTS, UNEXPLAINED, REPORT]
+        .into_iter()
+        .chain(FIGURES.iter().map(|(_, name)| name.as_str()))
 }
 
-/// Writes the tables, the figure in these formats, and the manifest last. Returns the names of the files.
+/// Writes the tables, the figure in these formats, the page with these data, and the manifest last. Returns the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
 pub fn write(
     folder: &Folder,
     (cells, layers): (&Cells<'_>, &[Layer]),
-    found: &Curves,
+    (found, page): (&Curves, &Value),
     formats: &[Format],
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
@@ -54,6 +57,8 @@ pub fn write(
         folder.replace(name, |out| write_figure(out, *format, &drawn))?;
         files.push(name);
     }
+    folder.replace(REPORT, |out| report::write(out, page))?;
+    files.push(REPORT);
     let listed = inventory::entries(folder, &files)?;
     let mut kinds = BTreeMap::new();
     for curve in &found.curves {
@@ -75,11 +80,12 @@ pub fn write(
             "curves": kinds,
             "ends": ends,
             "failures": failures,
-            "pairs": {
-                "explained": found.pairs.explained,
-                "basins": found.pairs.basins,
-                "unexplained": found.pairs.unexplained,
-            },
+            // Null if only some curves were searched.
+            "pairs": found.pairs.map(|pairs| json!({
+                "explained": pairs.explained,
+                "basins": pairs.basins,
+                "unexplained": pairs.unexplained,
+            })),
             "timings": { "find": elapsed.as_secs_f64(), "write": clock.elapsed().as_secs_f64() },
             "files": listed,
         }),

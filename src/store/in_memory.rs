@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use crate::map::bifurcation::Column;
+use crate::map::curves::Curves;
 use crate::map::scene::Scene;
 use crate::model_file::several_gaps;
 use crate::show::cells::Cells;
@@ -13,7 +14,7 @@ use crate::show::numbers::Number;
 use crate::show::orbit_spectrum::Spectrum;
 use crate::show::table::cell_columns::{self, Values};
 use crate::show::table::words_csv::WordRows;
-use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv, orbit_tables};
+use crate::show::table::{attractors_csv, bifurcation_tables, compare_csv, curve_tables, orbit_tables};
 use crate::show::words;
 use crate::store::compare;
 use crate::store::error::OutputError;
@@ -70,6 +71,20 @@ pub fn diagram(
     let of_columns = text(|to| bifurcation_tables::write_columns(to, axis, &numbers, columns))?;
     let of_points = text(|to| bifurcation_tables::write_points(to, axis, &names, gaps.as_deref(), columns))?;
     Ok((manifest.to_string(), of_columns, of_points))
+}
+
+/// Returns `curves.csv`, `curve_points.csv` and `unexplained.csv` of the curves of a map.
+///
+/// # Errors
+/// [`OutputError`] if a result cannot be formatted.
+pub fn curves(scene: &Scene, found: &Curves) -> Result<[String; 3], OutputError> {
+    let axes = [0, 1].map(|i| &*scene.axes()[i].parameter().name);
+    let states = scene.base().state_names();
+    Ok([
+        text(|to| curve_tables::write_curves(to, axes, &states, found))?,
+        text(|to| curve_tables::write_meetings(to, axes, &states, found))?,
+        text(|to| curve_tables::write_unexplained(to, axes, found))?,
+    ])
 }
 
 /// Returns `trajectory.csv` of an orbit, with this number of samples per forcing period. It has no rows if the motion failed.

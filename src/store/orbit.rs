@@ -22,6 +22,7 @@ use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{self, Head, MANIFEST, joined};
+use rattlemap_dynamics::cycle::Cycle;
 use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, History, Orbit, Settings, Stopped, history, trace};
@@ -37,7 +38,7 @@ pub const TABLED: usize = 2000;
 const LEAST_TABLED: usize = 50;
 
 /// Settings of an orbit, and the time of its computation.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct OrbitRequest {
     /// Initial state, at phase 0.
     pub start: State,
@@ -47,6 +48,8 @@ pub struct OrbitRequest {
     pub elapsed: Duration,
     /// State at a requested time.
     pub instant: Option<Instant>,
+    /// The cycle that solves its equations, if one is requested.
+    pub refined: Option<Cycle>,
 }
 
 /// Files of the figures of the motion.
@@ -89,7 +92,7 @@ pub fn write(
     let clock = Clock::now();
     // The manifest does not list files of an earlier orbit.
     inventory::clear_for(folder, names())?;
-    let json = to_json(model, orbit, request.instant);
+    let json = to_json(model, orbit, request.instant, request.refined.as_ref());
     folder.replace(JSON, |out| Ok(writeln!(out, "{json}")?))?;
     let mut files = vec![JSON];
     if orbit.class != Class::Failed {

@@ -42,7 +42,7 @@ fn the_page_lists_the_columns_of_all_files() {
     run(&folder, "map plane.toml --engine cpu --quiet").code(0);
     run(&folder, "validate out/plane --quiet").code(0);
     run(&folder, "bifurcation line.toml --quiet --set start.policy=both").code(0);
-    run(&folder, "orbit --set e=0.3 --out out/orbit").code(0);
+    run(&folder, "orbit --set e=0.3 --refine --out out/orbit").code(0);
     run(&folder, "orbit --from-start 2 --out out/first").code(0);
     run(&folder, "compare out/plane out/plane --quiet").code(0);
     assert_eq!(header(&dir.join("out/compare/plane-plane/compare.csv")), listed("compare.csv"));

@@ -185,3 +185,36 @@ fn reversals_and_sticking_are_events() {
     assert_eq!(kinds, ["stick", "slip", "stick", "slip"]);
     assert!(object["events"][0]["side"].is_null() && object["events"][0]["element"] == "friction");
 }
+
+/// In chaos the strobe search finds no cycle. The refined one is unstable, and its motion comes back after a period.
+#[test]
+fn an_unstable_cycle_in_chaos_is_refined() {
+    let folder = empty();
+    let chaos = "orbit --set e=0.8 --set omega=5.6";
+    let object = printed(&folder, &format!("{chaos} --refine --period 1 --word 563 --json"));
+    assert_eq!(object["class"], "chaotic");
+    let cycle = &object["refined"];
+    assert_eq!(cycle["period"], 1);
+    assert_eq!(cycle["word"], "356");
+    assert_eq!(cycle["stable"], false);
+    assert!(
+        cycle["floquet"][0][0].as_f64().unwrap() < -3.0
+            && cycle["event_times"].as_array().unwrap().len() == 3
+    );
+    let numbers = |list: &serde_json::Value| -> Vec<f64> {
+        list.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let start = numbers(&cycle["strobe"]);
+    let listed = start.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let after = printed(&folder, &format!("{chaos} --from-start 1 --start {listed} --json"));
+    for (a, b) in start.iter().zip(numbers(&after["end"])) {
+        assert!((a - b).abs() < 1e-10, "{start:?}: {after}");
+    }
+    run(&folder, &format!("{chaos} --refine"))
+        .failure()
+        .stderr(says(&["--period N asks for an unstable cycle"]));
+    run(&folder, "orbit --model belt-oscillator --refine --period 2")
+        .failure()
+        .stderr(says(&["only a model with a force has cycles of a given period"]));
+    run(&folder, &format!("{chaos} --refine --word 138")).code(2).stderr(says(&["`138` is no word"]));
+}

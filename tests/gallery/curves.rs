@@ -7,12 +7,22 @@ use crate::common::built_in;
 use rattlemap::job::{self, Processor};
 use rattlemap::map::curves::{Curve, Curves, Kind, Search, curves};
 use rattlemap::map::scene::{Quantity, Scene, Start};
-use rattlemap_dynamics::model::REST;
+use rattlemap::model_file::FileModel;
+use rattlemap_dynamics::model::{Model, REST};
 
 /// Finds the curves of a small map.
 fn found(model: &str, axes: [(&str, [f64; 2]); 2], longest: u32, start: Start) -> Curves {
-    let [(x, [left, right]), (y, [low, high])] = axes;
-    let scene = Scene::builder(built_in(model, &[]))
+    found_of(built_in(model, &[]), axes, longest, start)
+}
+
+/// Finds the curves of a small map of a model.
+fn found_of(
+    model: impl Model + 'static,
+    [(x, [left, right]), (y, [low, high])]: [(&str, [f64; 2]); 2],
+    longest: u32,
+    start: Start,
+) -> Curves {
+    let scene = Scene::builder(model)
         .axis(x, left..=right, 20)
         .axis(y, low..=high, 20)
         .start(start)
@@ -20,7 +30,7 @@ fn found(model: &str, axes: [(&str, [f64; 2]); 2], longest: u32, start: Start) -
         .build()
         .unwrap();
     let map = job::run(&scene, Processor::Cpu).unwrap();
-    let search = Search { longest, kinds: &[], most_curves: 100, most_points: 1000 };
+    let search = Search { longest, kinds: &[], word: None, from: None, most_curves: 100, most_points: 1000 };
     curves(&scene, map.plan(), map.records(), &search, &|_, _| (), &AtomicBool::new(false))
 }
 
@@ -92,5 +102,35 @@ fn folds_and_flips_of_a_bouncing_ball_lie_on_their_closed_forms() {
         assert!(!curves.is_empty(), "{kind:?}: {:?}", found.failures);
         let error = largest_error(&curves, range, closed);
         assert!(error < 1e-9, "{kind:?}: {error}");
+    }
+}
+
+/// The ball of the test above leaves the table with the speed 2 pi e / (1 + e), whatever the amplitude is. Contact lasts if this is at most
+/// mesh_speed, and if the table does not accelerate away faster than gravity: up to A^2 = A_fold^2 + 1.
+#[test]
+fn contact_of_a_bouncing_ball_lasts_between_its_limits() {
+    let rigid = include_str!("../../models/shaking_table.toml")
+        .replace("[motion]", "s = { default = 2.0, meaning = \"mesh_speed\" }\n[motion]")
+        .replace("A = { default = 1.5", "A = { default = 1.8")
+        + "mesh_speed = \"s\"\n";
+    let elastic = rigid.clone() + "stiffness = \"400\"\ndamping = \"4\"\n";
+    let leaving = |e: f64| 2.0 * PI * e / (1.0 + e);
+    let pressing = |e: f64| (PI * (1.0 - e) / (1.0 + e)).hypot(1.0);
+    // Starts near the cycles: contact of a ball that comes from elsewhere would last soon.
+    let cases = [
+        ("s", [1.0, 2.0], [1.8923, 1.9753], leaving as fn(f64) -> f64),
+        ("A", [1.7, 2.3], [1.513, 2.24], pressing),
+    ];
+    for text in [rigid, elastic] {
+        for (parameter, range, [x, v], closed) in cases {
+            let mut start = REST;
+            (start[0], start[1]) = (x, v);
+            let model = FileModel::parse(&text, "ball").unwrap();
+            let found = found_of(model, [("e", [0.28, 0.34]), (parameter, range)], 1, Start::State(start));
+            let curves = of(&found, Kind::MeshingBorder, 1);
+            assert!(!curves.is_empty(), "{parameter}: {:?}", found.failures);
+            let error = largest_error(&curves, range, closed);
+            assert!(error < 1e-9, "{parameter}: {error}");
+        }
     }
 }

@@ -300,6 +300,53 @@ fn the_policy_allows_only_the_script_and_style_of_the_page() {
     }
 }
 
+/// A pointer on a curve reads what the curve is, and a click keeps the text. Curves belong to the parameters of the map.
+#[test]
+fn the_page_of_curves_names_the_curve_under_the_pointer() {
+    let scene = "[[axis]]\nparameter = \"e\"\nmin = 0.5\nmax = 0.6\ncount = 6\n\
+                 [[axis]]\nparameter = \"omega\"\nmin = 5.0\nmax = 6.5\ncount = 6\n\
+                 [outputs]\nquantities = [\"class\", \"symmetric\"]\nfiles = [\"html\"]\n";
+    let report = Report::of(scene);
+    report.run(&["curves", "o", "--kind", "pitchfork", "--out", "c", "--quiet"]);
+    let Some(browser) = chromium() else { return skipped() };
+    let script = r##"
+canvas.setPointerCapture = () => {};
+async function look() {
+  await until(() => !document.getElementById("wait"));
+  const at = canvas.getBoundingClientRect();
+  const point = (type, [x, y]) => canvas.dispatchEvent(
+    new PointerEvent(type, { pointerId: 1, clientX: at.left + x, clientY: at.top + y, bubbles: true }));
+  const { places, list } = map.curves;
+  const k = Math.floor(list[0].count / 2);
+  const on = pixel(places[2 * k], places[2 * k + 1]), off = pixel(0.2, 0.2);
+  point("pointermove", off);
+  said.off = text("curve");
+  point("pointermove", on);
+  said.on = text("curve");
+  point("pointerdown", on);
+  point("pointerup", on);
+  point("pointermove", off);
+  said.kept = text("curve");
+  said.legend = [...document.querySelectorAll("#legend .line + span")].map((span) => span.textContent);
+  changes = { F: 51 };
+  said.changed = showsCurves();
+  finish();
+}
+look().catch((error) => { said.error = String(error.stack); finish(); });
+"##;
+    let said = visit(
+        browser,
+        &with_script(&report.folder.path().join("c/report.html"), script),
+        "",
+        &WITHOUT_GRAPHICS,
+        10_000,
+    );
+    let on = said["on"].as_str().unwrap_or_else(|| panic!("{said}"));
+    assert!(on.starts_with("Curve: pitchfork, cycles of period 1, word 36, at e = 0.5"), "{on}");
+    assert_eq!([&said["off"], &said["kept"]], [&json!(""), &json!(on)]);
+    assert_eq!([&said["legend"], &said["changed"]], [&json!(["pitchfork"]), &json!(false)]);
+}
+
 #[test]
 fn a_browser_refuses_foreign_scripts() {
     let report = Report::new();

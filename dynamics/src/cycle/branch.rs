@@ -8,7 +8,7 @@ use super::curve::{Condition, Seed};
 use super::equations::Linearised;
 use super::family::{Laws, Slopes};
 use super::{CycleError, Extra, Free, Itinerary, Solution, own, phase, placed, solve_scaled};
-use crate::machine::System;
+use crate::machine::{System, Touched};
 use crate::model::Model;
 use crate::stability::multipliers;
 use crate::word::Word;
@@ -24,6 +24,7 @@ const BENT: f64 = 0.9;
 /// Largest number of steps of a search for a special point, and its accuracy relative to the scales of the unknowns.
 const MOST_HALVINGS: usize = 60;
 const LOCATED: f64 = 1e-13;
+const LOCATED_ON_CURVE: f64 = 1e-10;
 
 /// Accuracy of a special point from which a curve is followed, and of a change of the sequence of flights that no curve explains.
 const ROUGHLY_LOCATED: f64 = 1e-5;
@@ -116,7 +117,9 @@ pub struct SpecialPoint {
     pub kind: Special,
     /// The cycle.
     pub at: BranchPoint,
-    /// The cycle at a graze, as one that touches without an event; none if it is not known, and on curves.
+    /// What changes the sequence of flights, if that is known.
+    pub meets: Option<Touched>,
+    /// The cycle at a graze, as one that touches without an event, or at an impact's limit; none if it is not known, and on curves.
     pub(super) touch: Option<(Itinerary, Solution)>,
 }
 
@@ -198,7 +201,7 @@ pub fn follow(
     let mut ahead = DVector::zeros(along.scales.len());
     *ahead.as_mut_slice().last_mut().expect("the parameter is an unknown") = if rises { 1.0 } else { -1.0 };
     let word = along.word(&start)?;
-    along.trace(along.point(start, &ahead, 0.0)?, word, limits)
+    along.trace(along.point(start, &ahead, 0.0, None)?, word, limits)
 }
 
 /// Follows the branch that leaves another one at a flip or at a pitchfork, in both directions: at a flip, one of them, because the other has
@@ -216,7 +219,7 @@ pub fn switch(
 ) -> Result<Vec<Vec<Branch>>, CycleError> {
     let (itinerary, at, is_flip) = (&part.itinerary, &special.at, special.kind == Special::Flip);
     let before = Along::new(model, itinerary, &at.solution, &[(parameter, range)], None)?;
-    let (_, linearised) = before.point(at.solution.clone(), &at.tangent, 0.0)?;
+    let (_, linearised) = before.point(at.solution.clone(), &at.tangent, 0.0, None)?;
     let size = at.solution.start.len();
     let sign = if is_flip { 1.0 } else { -1.0 };
     let scale = |i: usize, j: usize| before.scales[j] / before.scales[i];
@@ -239,7 +242,7 @@ pub fn switch(
     ahead.iter_mut().zip(entries).zip(&along.scales).for_each(|((ahead, x), scale)| *ahead = x / scale);
     ahead.normalize_mut();
     let arm = |ahead: DVector<f64>| -> Result<Vec<Branch>, CycleError> {
-        let mut first = along.point(start.clone(), &ahead, 0.0)?;
+        let mut first = along.point(start.clone(), &ahead, 0.0, None)?;
         // The equations cannot tell the tangents of the two branches apart.
         first.0.tangent = ahead;
         let word = along.word(&first.0.solution)?;
@@ -405,6 +408,11 @@ impl BranchPoint {
         self.multipliers.iter().enumerate().filter(kept).map(|(_, multiplier)| *multiplier)
     }
 
+    /// Returns the changes of the parameters per arclength, relative to their ranges.
+    pub fn heading(&self, parameters: usize) -> &[f64] {
+        &self.tangent.as_slice()[self.tangent.len() - parameters..]
+    }
+
     /// Whether the cycle is stable: all multipliers lie within the unit circle, except for the one that a curve keeps at 1 or -1.
     pub fn is_stable(&self) -> bool {
         self.regular().all(|[re, im]| re.hypot(im) < 1.0)
@@ -428,7 +436,8 @@ impl<'a> Along<'a> {
         scales[size..size + events].fill((events as f64).sqrt());
         let ranges = parameters.iter().rev().map(|(_, [low, high])| high - low);
         scales.iter_mut().rev().zip(ranges).for_each(|(scale, range)| *scale = range);
-        let (parameters, accuracy) = (parameters.to_vec(), LOCATED);
+        let accuracy = if condition.is_some() { LOCATED_ON_CURVE } else { LOCATED };
+        let parameters = parameters.to_vec();
         Ok(Along { model, itinerary, free, scales, parameters, condition, accuracy })
     }
 
@@ -442,14 +451,14 @@ impl<'a> Along<'a> {
         let itinerary = self.itinerary.clone();
         let (points, special) = (vec![now.0.clone()], Vec::new());
         let mut branch = Branch { itinerary, word, points, special, end: BranchEnd::Points };
-        let [mut length, least, largest] = limits.steps;
+        let ([mut length, least, largest], mut before) = (limits.steps, None);
         while branch.points.len() < limits.points {
             if limits.halt.load(Ordering::Relaxed) {
                 branch.end = BranchEnd::Halted;
                 break;
             }
             let cosine = |next: &BranchPoint| now.0.tangent.dot(&next.tangent);
-            let next = match self.next(&now, length) {
+            let next = match self.next(&now, before.as_ref(), length) {
                 Ok((next, count))
                     if (cosine(&next.0) >= BENT && count <= MOST_EASY_STEPS) || length <= least =>
                 {
@@ -492,10 +501,17 @@ impl<'a> Along<'a> {
             if branch.points.len() > LEAST_LOOP
                 && self.distance(&next.0.solution, &branch.points[0].solution) < length
             {
-                let same_way = next.0.tangent.dot(&branch.points[0].tangent) > 0.0;
-                branch.end = if same_way { BranchEnd::Closed } else { BranchEnd::TurnsBack };
+                let (first, apart) =
+                    (&branch.points[0], self.distance(&next.0.solution, &branch.points[0].solution));
+                if next.0.tangent.dot(&first.tangent) > 0.0 {
+                    branch.end = BranchEnd::Closed;
+                    branch.points.push(BranchPoint { arclength: next.0.arclength + apart, ..first.clone() });
+                } else {
+                    branch.end = BranchEnd::TurnsBack;
+                }
                 break;
             }
+            before = Some((now.0.solution.clone(), self.slope(&now)));
             now = next;
         }
         Ok(branch)
@@ -531,7 +547,9 @@ impl<'a> Along<'a> {
             .filter_map(|event| {
                 let at = self.locate(now, next, &|point| point.approaches[event])?;
                 let touch = self.itinerary.without(event, &at.solution, true);
-                Some(SpecialPoint { kind: Special::Grazing, at, touch })
+                let mut events = self.itinerary.passages.iter().filter(|passage| passage.is_event());
+                let meets = events.nth(event)?.touching().and_then(|touch| touch.touches());
+                Some(SpecialPoint { kind: Special::Grazing, at, meets, touch })
             })
             .min_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
         let border = || {
@@ -539,12 +557,15 @@ impl<'a> Along<'a> {
                 return None;
             }
             if let Some(at) = self.event_at_strobe(now, next) {
-                return Some(SpecialPoint { kind: Special::Border, at, touch: None });
+                return Some(SpecialPoint { kind: Special::Border, at, meets: None, touch: None });
             }
             let at = self.last_admissible(now, next);
             let touch = self.touch(next, &at);
-            let kind = if touch.is_some() { Special::Grazing } else { Special::Border };
-            Some(SpecialPoint { kind, at, touch })
+            let is_touch =
+                touch.as_ref().is_some_and(|(itinerary, solution)| !itinerary.touches(solution).is_empty());
+            let kind = if is_touch { Special::Grazing } else { Special::Border };
+            let meets = self.itinerary.first_change(&*self.model_at(next), &next.solution);
+            Some(SpecialPoint { kind, at, meets, touch })
         };
         grazing.or_else(border).filter(|border| self.end_of_range(&border.at).is_none())
     }
@@ -565,21 +586,21 @@ impl<'a> Along<'a> {
         if self.condition.is_some() {
             return None;
         }
-        let model = self.model_at(beyond);
-        let (itinerary, seed) = self.itinerary.with_next_touch(&*model, &beyond.solution)?;
-        let scales = itinerary.scales(self.model, &seed, &self.free).ok()?;
-        let extra = |_: &Laws, linearised: &Linearised, _: &Solution| {
-            Ok(phase(linearised, &self.free).into_iter().chain(linearised.touches.clone()).collect())
-        };
-        let (solution, _) = itinerary.newton(self.model, seed, &self.free, &scales, &extra).ok()?;
-        // Another graze is not the reason why the sequence changes here.
-        let (value, [low, high]) = (solution.values[solution.values.len() - 1], self.parameters[0].1);
-        if (value - last.value).abs() > (beyond.value - last.value).abs() + BESIDE_TOUCH * (high - low) {
-            return None;
-        }
-        itinerary
-            .is_followed(&*placed(self.model, &self.free, &solution.values), &solution)
+        let seeds = self.itinerary.with_next_touch(&*self.model_at(beyond), &beyond.solution)?;
+        seeds.into_iter().find_map(|(itinerary, seed)| {
+            let scales = itinerary.scales(self.model, &seed, &self.free).ok()?;
+            let extra = |_: &Laws, linearised: &Linearised, _: &Solution, _: &[Extra]| {
+                Ok(phase(linearised, &self.free).into_iter().chain(linearised.touches.clone()).collect())
+            };
+            let solution = itinerary.newton(self.model, seed, &self.free, &scales, &extra).ok()?.solution;
+            // Another graze is not the reason why the sequence changes here.
+            let (value, [low, high]) = (solution.values[solution.values.len() - 1], self.parameters[0].1);
+            let is_beside =
+                (value - last.value).abs() <= (beyond.value - last.value).abs() + BESIDE_TOUCH * (high - low);
+            (is_beside
+                && itinerary.is_followed(&*placed(self.model, &self.free, &solution.values), &solution))
             .then_some((itinerary, solution))
+        })
     }
 
     /// Returns folds, flips and pitchforks between two points.
@@ -591,8 +612,8 @@ impl<'a> Along<'a> {
             (Special::Flip, flip, at_flip),
             (Special::Pitchfork, pitchfork, at_flip),
         ];
-        let on_curve: [(Special, Test, f64); 2] =
-            [(Special::Fold, one, at_flip), (Special::Flip, flip, at_flip)];
+        let of_half = if self.itinerary.mirrored { Special::Pitchfork } else { Special::Flip };
+        let on_curve: [(Special, Test, f64); 2] = [(Special::Fold, one, at_flip), (of_half, flip, at_flip)];
         let tests = if self.condition.is_some() { &on_curve[..] } else { &on_branch };
         let mut found = Vec::new();
         for &(kind, test, most) in tests {
@@ -605,7 +626,7 @@ impl<'a> Along<'a> {
                     && !(kind == Special::Fold && self.itinerary.repeats(&*self.model_at(at), &at.solution))
                     && test(at).abs() <= most
             };
-            found.extend(at.filter(is_there).map(|at| SpecialPoint { kind, at, touch: None }));
+            found.extend(at.filter(is_there).map(|at| SpecialPoint { kind, at, meets: None, touch: None }));
         }
         found.sort_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
         found
@@ -619,33 +640,39 @@ impl<'a> Along<'a> {
         placed(self.model, &self.free, &point.solution.values)
     }
 
-    /// Returns the equations of the phase and of the condition.
+    /// Returns the equations of the phase and of the condition. `nearby`: these equations at a nearby solution, or none.
     pub(super) fn conditions(
         &self,
         laws: &Laws,
         linearised: &Linearised,
         at: &Solution,
+        nearby: &[Extra],
     ) -> Result<Vec<Extra>, CycleError> {
         let mut all = phase(linearised, &self.free);
         if let Some(condition) = self.condition {
-            all.extend(condition.equations(self, laws, linearised, at)?);
+            let gradient = nearby.get(all.len()).map(|(gradient, _)| gradient);
+            all.extend(condition.equations(self, laws, linearised, at, gradient)?);
         }
         Ok(all)
     }
 
-    /// Completes a solution to a point whose tangent continues an earlier one.
+    /// Completes a solution to a point whose tangent continues an earlier one. `nearby`: laws and further equations at a nearby solution.
     pub(super) fn point(
         &self,
         solution: Solution,
         before: &DVector<f64>,
         arclength: f64,
+        nearby: Option<&(Laws, Vec<Extra>)>,
     ) -> Result<(BranchPoint, Linearised), CycleError> {
         let model = placed(self.model, &self.free, &solution.values);
-        let laws = Laws::new(&*model, &self.free, Slopes::Fast)?;
+        let laws = match nearby {
+            Some((laws, _)) => laws.beside(&*model)?,
+            None => Laws::new(&*model, &self.free, Slopes::Fast)?,
+        };
         let linearised = self.itinerary.linearise(&laws, &solution)?;
-        let count = before.len();
+        let (count, nearby) = (before.len(), nearby.map_or(&[][..], |(_, extra)| extra));
         let row = RowDVector::from_fn(count, |_, j| before[j] / self.scales[j]);
-        let mut extra = self.conditions(&laws, &linearised, &solution)?;
+        let mut extra = self.conditions(&laws, &linearised, &solution, nearby)?;
         extra.push((row, 0.0));
         let (matrix, mut right) = linearised.with(&extra);
         right.fill(0.0);
@@ -664,17 +691,36 @@ impl<'a> Along<'a> {
         Ok((point, linearised))
     }
 
-    /// Returns the point at a distance along the tangent, and the number of Newton steps.
+    /// Returns the rates of change of a cycle along its branch.
+    fn slope(&self, (at, linearised): &(BranchPoint, Linearised)) -> Solution {
+        let direction = DVector::from_fn(at.tangent.len(), |j, _| at.tangent[j] * self.scales[j]);
+        linearised.along(&at.solution, &direction)
+    }
+
+    /// Returns the point at a distance along the tangent, and the number of Newton steps. `before`: the point before this one, and its slope. A
+    /// cubic through both points predicts the next one; without an earlier point, the tangent does.
     fn next(
         &self,
-        (from, linearised): &(BranchPoint, Linearised),
+        now: &(BranchPoint, Linearised),
+        before: Option<&(Solution, Solution)>,
         length: f64,
     ) -> Result<((BranchPoint, Linearised), usize), CycleError> {
-        let mut predicted = from.solution.clone();
-        let scaled = |j: usize| from.tangent[j] * self.scales[j];
-        let step = DVector::from_fn(from.tangent.len(), |j, _| scaled(j) * length);
-        linearised.change(&mut predicted, self.itinerary, &step);
-        self.correct(from, predicted, length)
+        let (here, slope) = (&now.0.solution, self.slope(now));
+        let predicted = match before {
+            None => here.plus(&slope, length),
+            Some((first, first_slope)) => {
+                let apart = self.distance(first, here);
+                // Hermite's cubic, as a sum over what it is in both points.
+                let t = length / apart;
+                let of_first = t * t * (3.0 + 2.0 * t);
+                let of_slopes = [t * t * (1.0 + t) * apart, t * (1.0 + t) * (1.0 + t) * apart];
+                here.plus(&slope, of_slopes[1])
+                    .plus(first_slope, of_slopes[0])
+                    .plus(first, of_first)
+                    .plus(here, -of_first)
+            }
+        };
+        self.correct(&now.0, predicted, length)
     }
 
     /// Returns the point across the tangent of an earlier one from a prediction, and the number of Newton steps.
@@ -686,15 +732,18 @@ impl<'a> Along<'a> {
     ) -> Result<((BranchPoint, Linearised), usize), CycleError> {
         let centre = predicted.unknowns(self.itinerary);
         let row = RowDVector::from_fn(centre.len(), |_, j| from.tangent[j] / self.scales[j]);
-        let extra = |laws: &Laws, linearised: &Linearised, at: &Solution| {
+        let extra = |laws: &Laws, linearised: &Linearised, at: &Solution, nearby: &[Extra]| {
             let ahead = &row * (at.unknowns(self.itinerary) - &centre);
-            let mut all = self.conditions(laws, linearised, at)?;
+            let mut all = self.conditions(laws, linearised, at, nearby)?;
             all.push((row.clone(), ahead[0]));
             Ok(all)
         };
-        let (solution, count) =
-            self.itinerary.newton(self.model, predicted, &self.free, &self.scales, &extra)?;
-        Ok((self.point(solution, &from.tangent, from.arclength + length)?, count))
+        let found = self.itinerary.newton(self.model, predicted, &self.free, &self.scales, &extra)?;
+        let (solution, length) = (found.solution, from.arclength + length);
+        let next = self.point(solution, &from.tangent, length, Some(&found.nearby))?;
+        // Where multipliers grow without limit, a matrix may be almost singular in another way.
+        let is_critical = self.condition.is_none_or(|condition| condition.is_met(&next.0.multipliers));
+        if is_critical { Ok((next, found.steps)) } else { Err(CycleError::Diverges) }
     }
 
     /// Whether the motion along the cycle has the cycle's sequence of flights.
@@ -702,48 +751,58 @@ impl<'a> Along<'a> {
         self.itinerary.is_followed(&*self.model_at(point), &point.solution)
     }
 
-    /// Returns the point between two points where a test function is 0, by false position and bisection; none if it has the same sign at both.
+    /// Returns the point between two points where a test function is 0, by inverse quadratic interpolation and bisection (Chandrupatla 1997);
+    /// none if it has the same sign at both.
     fn locate(
         &self,
         from: &(BranchPoint, Linearised),
         to: &BranchPoint,
         test: &dyn Fn(&BranchPoint) -> f64,
     ) -> Option<BranchPoint> {
-        let length = to.arclength - from.0.arclength;
-        let (mut low, mut high) =
-            ((0.0, test(&from.0), from.0.solution.clone()), (length, test(to), to.solution.clone()));
-        let mut found = None;
-        let (opposite, mut failures) = (low.1 * high.1 < 0.0, 0);
-        for nth in (0..MOST_HALVINGS).take_while(|_| opposite) {
-            // At a pitchfork the equations are singular: there the search goes on from other points.
-            let share = match failures {
-                0 if nth % 3 == 2 => 0.5,
-                0 => low.1 / (low.1 - high.1),
-                _ => 0.5 + 0.1 * f64::from(failures),
-            };
-            let share = share.clamp(1e-3, 1.0 - 1e-3);
-            let middle = low.0 + share * (high.0 - low.0);
-            let predicted = low.2.between(&high.2, share);
+        let mut latest = (to.arclength - from.0.arclength, test(to), to.solution.clone());
+        let mut other = (0.0, test(&from.0), from.0.solution.clone());
+        if latest.1 * other.1 >= 0.0 {
+            return None;
+        }
+        let (mut found, mut share, mut failures) = (None, 0.5, 0);
+        for _ in 0..MOST_HALVINGS {
+            let middle = latest.0 + share * (other.0 - latest.0);
+            let predicted = latest.2.between(&other.2, share);
             let Ok(((point, _), _)) = self.correct(&from.0, predicted, middle) else {
+                // At a pitchfork the equations are singular: there the search goes on from other points.
                 failures += 1;
                 if failures > MOST_FAILURES {
                     break;
                 }
+                share = 0.5 + 0.1 * f64::from(failures);
                 continue;
             };
-            let value = test(&point);
-            if value * low.1 > 0.0 {
-                low = (middle, value, point.solution.clone());
-            } else {
-                high = (middle, value, point.solution.clone());
-            }
             failures = 0;
+            let value = test(&point);
+            let next = (middle, value, point.solution.clone());
             if found.as_ref().is_none_or(|(best, _): &(f64, BranchPoint)| value.abs() <= *best) {
                 found = Some((value.abs(), point));
             }
-            if value == 0.0 || high.0 - low.0 <= self.accuracy {
+            let third = if value * latest.1 > 0.0 {
+                std::mem::replace(&mut latest, next)
+            } else {
+                std::mem::replace(&mut other, std::mem::replace(&mut latest, next))
+            };
+            let least = self.accuracy / (other.0 - latest.0).abs();
+            if value == 0.0 || least > 0.5 {
                 break;
             }
+            let ([a, b, c], [of_a, of_b, of_c]) =
+                ([latest.0, other.0, third.0], [latest.1, other.1, third.1]);
+            let (xi, phi) = ((a - b) / (c - b), (of_a - of_b) / (of_c - of_b));
+            share = match phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+                true => {
+                    of_a / (of_b - of_a) * of_c / (of_b - of_c)
+                        + (c - a) / (b - a) * of_a / (of_c - of_a) * of_b / (of_c - of_b)
+                }
+                false => 0.5,
+            };
+            share = share.clamp(least, 1.0 - least);
         }
         found.map(|(_, point)| point)
     }
@@ -759,7 +818,7 @@ impl<'a> Along<'a> {
             match self.correct(&from.0, found.solution.between(&end, 0.5), middle) {
                 Ok(((point, _), _)) if self.is_admissible(&point) => (low, found) = (middle, point),
                 Ok(((point, _), _)) => (high, end) = (middle, point.solution),
-                Err(_) => high = middle,
+                Err(_) => (high, end) = (middle, found.solution.between(&end, 0.5)),
             }
             if high - low <= accuracy {
                 break;

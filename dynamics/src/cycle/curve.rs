@@ -20,10 +20,16 @@ use crate::word::Word;
 const DIFFERENCE: f64 = 1e-6;
 
 /// Number of times that a border is chosen: the null vectors of one are the border of the next.
-const BORDERS: usize = 3;
+const BORDERS: usize = 2;
+
+/// Largest distance of the multiplier that a condition fixes from its value.
+const CRITICAL: f64 = 1e-4;
 
 /// Lengths at which a curve goes on beyond a change of its sequence of flights, in scaled unknowns.
-const BEYOND: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+const BEYOND: [f64; 4] = [1e-7, 1e-5, 1e-4, 1e-3];
+
+/// Largest number of searches for a curve with the same sequence of flights.
+const MOST_TRIALS: usize = 3;
 
 /// Largest distance of a curve's first cycle from its seed, in scaled unknowns.
 const MOST_MOVED: f64 = 0.05;
@@ -41,7 +47,8 @@ pub enum Condition {
     Fold,
     /// A multiplier is -1: the period doubles. Of half a cycle that is its own mirror image, the symmetry ends: a pitchfork.
     Flip,
-    /// The motion touches a wall, or a force or a rate touches 0, without an event.
+    /// The motion touches a wall, or a force or a rate touches 0, without an event; or an impact is at the limit of those after which contact
+    /// lasts.
     Touch,
 }
 
@@ -64,13 +71,13 @@ impl Seed {
         let (condition, (itinerary, solution)) = match special.kind {
             Special::Fold => (Condition::Fold, on_branch()),
             Special::Flip => (Condition::Flip, on_branch()),
-            Special::Grazing => (Condition::Touch, special.touch.clone()?),
-            Special::Pitchfork | Special::Border => return None,
+            Special::Grazing | Special::Border => (Condition::Touch, special.touch.clone()?),
+            Special::Pitchfork => return None,
         };
         Some(Seed { condition, word: part.word.clone(), itinerary, solution })
     }
 
-    /// Returns what the motion touches.
+    /// Returns what the motion touches, or that an impact is at its limit.
     pub fn touched(&self) -> Option<Touched> {
         self.itinerary.passages.iter().find_map(|passage| passage.touches())
     }
@@ -89,7 +96,7 @@ impl Seed {
 
     /// Returns the number of events apart from touches.
     pub fn events(&self) -> usize {
-        let is_event = |passage: &&Passage| passage.is_event() && passage.touches().is_none();
+        let is_event = |passage: &&Passage| passage.is_event() && !passage.is_touch();
         self.itinerary.passages.iter().filter(is_event).count()
     }
 
@@ -99,7 +106,8 @@ impl Seed {
     }
 }
 
-/// Follows a curve over two parameters within their ranges, in both directions. `parameter`: the parameter of the branch that the seed lies on.
+/// Follows a curve over two parameters within their ranges, in one direction or in the other one. `parameter`: the parameter of the branch that
+/// the seed lies on.
 ///
 /// # Errors
 /// [`CycleError`] if the seed is on no curve.
@@ -107,9 +115,9 @@ pub fn curve(
     model: &dyn Model,
     seed: &Seed,
     parameter: usize,
-    parameters: [(usize, [f64; 2]); 2],
+    (parameters, forward): ([(usize, [f64; 2]); 2], bool),
     limits: &BranchLimits<'_>,
-) -> Result<[Vec<Branch>; 2], CycleError> {
+) -> Result<Vec<Branch>, CycleError> {
     let own = seed.solution.values.len() - 1;
     let of = |(index, _): (usize, _)| match index == parameter {
         true => seed.solution.values[own],
@@ -119,30 +127,24 @@ pub fn curve(
     start.values = start.values.rows(0, own).into_owned().push(of(parameters[0])).push(of(parameters[1]));
     let other = usize::from(parameters[0].0 == parameter);
     let along = Along::new(model, &seed.itinerary, &start, &parameters, Some(seed.condition))?;
-    let start_at_seed = start.clone();
-    let (start, place) = along.solve_at(start, other)?;
+    let solve = |number: usize| {
+        let direction = [0, 1].map(|i| if i == number { 1.0 } else { 0.0 });
+        Ok((along.solve_across(&start, direction)?, number))
+    };
+    let (solved, number) = solve(other).or_else(|_: CycleError| solve(1 - other))?;
     let mut ahead = DVector::zeros(along.scales.len());
-    ahead[place] = 1.0;
-    let (first, linearised) = along.point(start, &ahead, 0.0)?;
-    let moved = along.distance(&first.solution, &start_at_seed);
-    if !along.is_admissible(&first) || along.end_of_range(&first).is_some() || moved > MOST_MOVED {
+    ahead[along.scales.len() - 2 + number] = if forward { 1.0 } else { -1.0 };
+    let (first, linearised) = along.point(solved, &ahead, 0.0, None)?;
+    let moved = along.distance(&first.solution, &start);
+    let is_met = seed.condition.is_met(&first.multipliers) && along.is_admissible(&first);
+    if !is_met || along.end_of_range(&first).is_some() || moved > MOST_MOVED {
         return Err(CycleError::Diverges);
     }
-    let start_point = first;
-    let arm = |sign: f64| {
-        let mut point = start_point.clone();
-        point.tangent *= sign;
-        let part = along.trace((point, linearised.clone()), seed.word.clone(), limits)?;
-        Ok::<_, CycleError>(go_on(model, vec![part], parameters, seed.condition, limits))
-    };
-    let first = arm(-1.0)?;
-    // A closed curve has all its points already.
-    let is_closed = first.last().is_some_and(|part| part.end == BranchEnd::Closed);
-    let second = if is_closed { Vec::new() } else { arm(1.0)? };
-    Ok([first, second])
+    let part = along.trace((first, linearised), seed.word.clone(), limits)?;
+    Ok(go_on(model, vec![part], parameters, seed.condition, limits))
 }
 
-/// Follows a curve on from the end of its last part, where its sequence of flights changes: events pass phase 0.
+/// Follows a curve on from the end of its last part, where its sequence of flights changes: mostly because an event passes phase 0.
 fn go_on(
     model: &dyn Model,
     mut parts: Vec<Branch>,
@@ -156,7 +158,7 @@ fn go_on(
         && let Ok(along) = Along::new(model, &part.itinerary, &at.solution, &parameters, Some(condition))
         && let Some((itinerary, solution, ahead)) = along.successor(at)
         && let Ok(along) = Along::new(model, &itinerary, &solution, &parameters, Some(condition))
-        && let Ok((mut first, linearised)) = along.point(solution, &along.towards(&ahead), 0.0)
+        && let Ok((mut first, linearised)) = along.point(solution, &along.towards(&ahead), 0.0, None)
     {
         let way: f64 = (0..2).map(|i| ahead[i] * first.tangent[first.tangent.len() - 2 + i]).sum();
         if way < 0.0 {
@@ -168,7 +170,7 @@ fn go_on(
         let Ok(beyond) = along.trace((first, linearised), word, &limits) else { break };
         // An event that passes phase 0 is nothing special.
         if let Some(part) = parts.last_mut() {
-            part.special.pop_if(|last| last.kind == Special::Border);
+            part.special.pop_if(|last| last.kind == Special::Border && last.meets.is_none());
         }
         parts.push(beyond);
     }
@@ -176,22 +178,34 @@ fn go_on(
 }
 
 impl Condition {
-    /// Returns the place of the multiplier that the condition fixes.
-    pub(super) fn critical(self, multipliers: &[[f64; 2]]) -> Option<usize> {
+    /// Returns the multiplier that the condition fixes.
+    fn multiplier(self) -> Option<f64> {
         match self {
-            Condition::Fold => nearest(multipliers, 1.0),
-            Condition::Flip => nearest(multipliers, -1.0),
+            Condition::Fold => Some(1.0),
+            Condition::Flip => Some(-1.0),
             Condition::Touch => None,
         }
     }
 
-    /// Returns the equations of the condition.
+    /// Returns the place of the multiplier that the condition fixes.
+    pub(super) fn critical(self, multipliers: &[[f64; 2]]) -> Option<usize> {
+        nearest(multipliers, self.multiplier()?)
+    }
+
+    /// Whether a multiplier has the value that the condition fixes.
+    pub(super) fn is_met(self, multipliers: &[[f64; 2]]) -> bool {
+        self.multiplier()
+            .is_none_or(|number| multipliers.iter().any(|[re, im]| (re - number).hypot(*im) <= CRITICAL))
+    }
+
+    /// Returns the equations of the condition. `gradient`: that of a nearby solution, if it is known.
     pub(super) fn equations(
         self,
         along: &Along<'_>,
         laws: &Laws,
         linearised: &Linearised,
         at: &Solution,
+        gradient: Option<&RowDVector<f64>>,
     ) -> Result<Vec<Extra>, CycleError> {
         if self == Condition::Touch {
             return Ok(linearised.touches.clone());
@@ -212,6 +226,9 @@ impl Condition {
         let sizes: Vec<f64> = scaled.row_iter().map(|row| row.amax().max(f64::MIN_POSITIVE)).collect();
         scaled.row_iter_mut().zip(&sizes).for_each(|(mut row, size)| row /= *size);
         let [left, right, value] = singular(&scaled).ok_or(CycleError::Diverges)?;
+        if let Some(gradient) = gradient {
+            return Ok(vec![(gradient.clone(), value[0])]);
+        }
         let mut step = DVector::zeros(along.scales.len());
         (0..count).for_each(|j| step[j] = right[j] * along.scales[j] * DIFFERENCE);
         let weights = RowDVector::from_fn(all, |_, i| -left[i] / sizes[i]);
@@ -255,23 +272,20 @@ fn singular(matrix: &DMatrix<f64>) -> Option<[DVector<f64>; 3]> {
 }
 
 impl Along<'_> {
-    /// Solves all equations where one of the two parameters stays as it is: the one with this number, or else the other one. Returns the
-    /// place of the one that stays.
-    fn solve_at(&self, at: Solution, number: usize) -> Result<(Solution, usize), CycleError> {
-        let solve = |number: usize| {
-            let place = self.scales.len() - 2 + number;
-            let extra = |laws: &Laws, linearised: &Linearised, at: &Solution| {
-                let mut row = RowDVector::zeros(self.scales.len());
-                row[place] = 1.0;
-                let mut all = self.conditions(laws, linearised, at)?;
-                all.push((row, 0.0));
-                Ok(all)
-            };
-            let (found, _) =
-                self.itinerary.newton(self.model, at.clone(), &self.free, &self.scales, &extra)?;
-            Ok((found, place))
+    /// Solves all equations where the scaled parameters only change across a direction.
+    fn solve_across(&self, at: &Solution, direction: [f64; 2]) -> Result<Solution, CycleError> {
+        let (count, first) = (self.scales.len(), at.values.len() - 2);
+        let mut row = RowDVector::zeros(count);
+        (0..2).for_each(|i| row[count - 2 + i] = direction[i] / self.scales[count - 2 + i]);
+        let centre = [0, 1].map(|i| at.values[first + i]);
+        let extra = |laws: &Laws, linearised: &Linearised, at: &Solution, nearby: &[Extra]| {
+            let mut all = self.conditions(laws, linearised, at, nearby)?;
+            let ahead = (0..2).map(|i| row[count - 2 + i] * (at.values[first + i] - centre[i])).sum();
+            all.push((row.clone(), ahead));
+            Ok(all)
         };
-        solve(number).or_else(|_: CycleError| solve(1 - number))
+        let found = self.itinerary.newton(self.model, at.clone(), &self.free, &self.scales, &extra)?;
+        Ok(found.solution)
     }
 
     /// Returns the unit vector of scaled unknowns in the direction of the larger one of two changes of the parameters.
@@ -294,10 +308,10 @@ impl Along<'_> {
     fn successor(&self, at: &BranchPoint) -> Option<(Itinerary, Solution, [f64; 2])> {
         let count = at.tangent.len();
         let ahead = [at.tangent[count - 2], at.tangent[count - 1]];
-        let number = usize::from(ahead[1].abs() > ahead[0].abs());
         let laws = Laws::new(&*placed(self.model, &self.free, &at.solution.values), &self.free, Slopes::Fast)
             .ok()?;
         let linearised = self.itinerary.linearise(&laws, &at.solution).ok()?;
+        let mut tried: Vec<Itinerary> = Vec::new();
         for length in BEYOND {
             let step = DVector::from_fn(count, |j, _| at.tangent[j] * self.scales[j] * length);
             let mut seed = at.solution.clone();
@@ -306,16 +320,21 @@ impl Along<'_> {
             let Ok(oscillator) = model.oscillator() else { continue };
             let system = System::new(&oscillator);
             let half_periods = self.itinerary.half_periods(&system);
-            let starts = [seed.state()].into_iter().chain(self.itinerary.beside_strobe(&system, &seed));
-            for state in starts {
+            let at_limit = self.itinerary.beside_limit(&seed, &self.scales);
+            for state in at_limit.into_iter().chain(self.itinerary.beside_strobe(&system, &seed)) {
                 let Ok((next, mut start)) = Itinerary::of(&*model, &state, half_periods) else { continue };
                 start.values = seed.values.clone();
                 let Some((next, start)) = self.itinerary.touching(&seed, (next, start)) else { continue };
-                if next.is_like(self.itinerary) {
+                let trials = tried.iter().filter(|tried| tried.is_like(&next)).count();
+                if next.is_like(self.itinerary) || trials == MOST_TRIALS {
                     continue;
                 }
-                let beyond = Along::new(self.model, &next, &start, &self.parameters, self.condition).ok()?;
-                if let Ok((solution, _)) = beyond.solve_at(start, number)
+                tried.push(next.clone());
+                let Ok(beyond) = Along::new(self.model, &next, &start, &self.parameters, self.condition)
+                else {
+                    continue;
+                };
+                if let Ok(solution) = beyond.solve_across(&start, ahead)
                     && self.is_beside(at, &solution, length)
                     && next.is_followed(&*placed(self.model, &self.free, &solution.values), &solution)
                 {

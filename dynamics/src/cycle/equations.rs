@@ -1,11 +1,12 @@
 //! The equations of a cycle and their derivatives.
 
-use nalgebra::{DMatrix, DVector, RowDVector};
+use nalgebra::{DMatrix, DVector, SVector};
 
 use super::family::Laws;
-use super::flight::{Equations, Flight, drift, point};
+use super::flight::{End, Equations, Flight, drift, point};
 use super::{CycleError, Extra, Itinerary, Solution};
 use crate::machine::{Passage, System};
+use crate::model::MOST_COORDINATES;
 
 /// Relative change of a state for derivatives of the duration of a series of impacts, which is a smooth function of it.
 const DIFFERENCE: f64 = 1e-5;
@@ -24,7 +25,7 @@ pub(super) struct Linearised {
     pub(super) rates: DVector<f64>,
     /// Rates of change, per turn, of the function of each event. They are 0 where the event is at a graze.
     pub(super) approaches: Vec<f64>,
-    /// For each touch, this rate and its derivatives by all unknowns.
+    /// For each touch, this rate, and for each limit, its function, with their derivatives by all unknowns.
     pub(super) touches: Vec<Extra>,
     /// Derivatives of the states before each end by all unknowns, and the changes of these states that make all flights fit.
     ends: Vec<DMatrix<f64>>,
@@ -42,63 +43,152 @@ struct Carried {
     /// Derivatives by all unknowns, and by the state at phase 0 where events follow the state.
     by: DMatrix<f64>,
     misfit: DVector<f64>,
+    /// Time in turns, and its derivatives.
+    turns: f64,
+    turns_by: DVector<f64>,
+    /// Column of the first free number.
+    first_free: usize,
+    /// Memory that is used again.
+    memory: DMatrix<f64>,
 }
 
 impl Carried {
-    /// Applies the jumps of a passage. `first_free`: the column of the first free number.
-    fn jump(&mut self, laws: &Laws, passage: &Passage, first_free: usize) {
-        let (system, n, before) = (&laws.system, self.state.len() / 2, self.state.clone());
-        let explicit = |j: usize| laws.slope(j, |system| jumped(system, passage, &before));
-        let explicit: Vec<DVector<f64>> = (0..laws.free()).map(explicit).collect();
+    /// Carries the derivatives over a flight of fixed duration.
+    fn fly(&mut self, end: &End) {
+        self.by.ger(-1.0, &end.rates[0], &self.turns_by, 1.0);
+        end.by_state.mul_to(&self.by, &mut self.memory);
+        std::mem::swap(&mut self.by, &mut self.memory);
+        for (j, of_free) in end.by_parameter.iter().enumerate() {
+            if let Some(of_free) = of_free {
+                self.by.column_mut(self.first_free + j).axpy(1.0, of_free, 1.0);
+            }
+        }
+        self.misfit = &end.by_state * &self.misfit;
+    }
+
+    /// Applies the jumps of a passage.
+    fn jump(&mut self, laws: &Laws, passage: &Passage) {
+        let (system, n) = (&laws.system, self.state.len() / 2);
+        let explicit: Vec<Velocities> = match system.jump(passage, 0, &self.state.as_slice()[n..]) {
+            Some(_) => (0..laws.free())
+                .map(|j| laws.slope(j, |system| changed(system, passage, &self.state)))
+                .collect(),
+            None => Vec::new(),
+        };
         for nth in 0.. {
             let Some(jump) = system.jump(passage, nth, &self.state.as_slice()[n..]) else { break };
-            let rate_by = jump.row.transpose() * self.by.rows(n, n) * jump.slope;
-            let misfit = jump.row.dot(&self.misfit.rows(n, n)) * jump.slope;
-            let mut by = self.by.rows_mut(n, n);
-            by += &jump.kick * rate_by;
-            self.misfit.rows_mut(n, n).axpy(misfit, &jump.kick, 1.0);
-            self.state.rows_mut(n, n).axpy(jump.change, &jump.kick, 1.0);
+            let columns = self.by.as_mut_slice().chunks_exact_mut(2 * n);
+            for column in columns.chain([self.misfit.as_mut_slice()]) {
+                jump.add(jump.rate(&column[n..]) * jump.slope, &mut column[n..]);
+            }
+            jump.add(jump.change, &mut self.state.as_mut_slice()[n..]);
         }
-        for mut column in self.by.column_iter_mut() {
-            system.shift_back(passage, column.as_mut_slice());
+        let columns = self.by.as_mut_slice().chunks_exact_mut(2 * n);
+        for column in columns.chain([self.misfit.as_mut_slice(), self.state.as_mut_slice()]) {
+            system.shift_back(passage, column);
         }
-        system.shift_back(passage, self.misfit.as_mut_slice());
-        system.shift_back(passage, self.state.as_mut_slice());
-        explicit.iter().enumerate().for_each(|(j, x)| self.by.column_mut(first_free + j).axpy(1.0, x, 1.0));
+        for (j, changes) in explicit.iter().enumerate() {
+            let column = self.by.column_mut(self.first_free + j);
+            column.into_iter().skip(n).zip(changes).for_each(|(x, change)| *x += change);
+        }
+    }
+
+    /// Returns the derivatives of a function of the present point by all unknowns, and its value.
+    fn value(&self, orders: &[f64], function: &Function) -> Extra {
+        let at = point(orders, &self.state, self.turns);
+        let of_state = function.factors.rows(0, self.state.len());
+        let mut by = self.by.tr_mul(&of_state);
+        by.axpy(drift(orders, &function.factors, &at), &self.turns_by, 1.0);
+        for (j, by_free) in function.by_free.iter().enumerate() {
+            by[self.first_free + j] += by_free.dot(&at);
+        }
+        (by.transpose(), function.factors.dot(&at) + of_state.dot(&self.misfit))
     }
 }
 
-/// The equations of flights and their derivatives by free numbers, computed once for all flights in the same modes.
-#[derive(Default)]
-struct EquationsByModes(Vec<(usize, Equations, Vec<Equations>)>);
+/// A linear function of points: its factors, and their derivatives by free numbers.
+struct Function {
+    factors: DVector<f64>,
+    by_free: Vec<DVector<f64>>,
+}
 
-impl EquationsByModes {
+impl Function {
+    fn of(laws: &Laws, factors: impl Fn(&System) -> DVector<f64>) -> Function {
+        let by_free = (0..laws.free()).map(|j| laws.slope(j, &factors)).collect();
+        Function { factors: factors(&laws.system), by_free }
+    }
+}
+
+/// The laws along a cycle.
+#[derive(Default)]
+struct KnownLaws {
+    /// The equations of flights and their derivatives by free numbers, computed once for all flights in the same modes.
+    flights: Vec<(usize, Equations, Vec<Option<Equations>>)>,
+    /// The functions that are 0 at events, computed once for all events of the same kind.
+    conditions: Vec<(usize, Function)>,
+}
+
+impl KnownLaws {
     /// Returns the equations of the flight with this place.
-    fn of(&mut self, laws: &Laws, passages: &[Passage], place: usize) -> (&Equations, &[Equations]) {
+    fn flight(
+        &mut self,
+        laws: &Laws,
+        passages: &[Passage],
+        place: usize,
+    ) -> (&Equations, &[Option<Equations>]) {
         let has_modes = |(other, ..): &(usize, _, _)| passages[*other].has_modes_of(&passages[place]);
-        let at = self.0.iter().position(has_modes).unwrap_or_else(|| {
+        let at = self.flights.iter().position(has_modes).unwrap_or_else(|| {
             let accelerations = |system: &System| system.accelerations(&passages[place]) * system.period();
             let of_flight =
                 Equations { period: laws.system.period(), accelerations: accelerations(&laws.system) };
             let by_free = |j: usize| {
                 let period = laws.slope(j, |system| system.period());
-                Equations { period, accelerations: laws.slope(j, accelerations) }
+                let slopes = Equations { period, accelerations: laws.slope(j, accelerations) };
+                let depends = period != 0.0 || slopes.accelerations.iter().any(|x| *x != 0.0);
+                depends.then_some(slopes)
             };
-            self.0.push((place, of_flight, (0..laws.free()).map(by_free).collect()));
-            self.0.len() - 1
+            self.flights.push((place, of_flight, (0..laws.free()).map(by_free).collect()));
+            self.flights.len() - 1
         });
-        let (_, of_flight, by_parameter) = &self.0[at];
+        let (_, of_flight, by_parameter) = &self.flights[at];
         (of_flight, by_parameter)
     }
+
+    /// Returns the function that is 0 at the event with this place.
+    fn condition(&mut self, laws: &Laws, passages: &[Passage], place: usize) -> Option<&Function> {
+        passages[place].is_event().then_some(())?;
+        let is_same = |(other, _): &(usize, _)| passages[*other].meets_event_of(&passages[place]);
+        let at = self.conditions.iter().position(is_same).unwrap_or_else(|| {
+            let function = Function::of(laws, |system| {
+                system.condition(&passages[place]).expect("all systems of a model have the same events")
+            });
+            self.conditions.push((place, function));
+            self.conditions.len() - 1
+        });
+        Some(&self.conditions[at].1)
+    }
+}
+
+/// Velocities without an allocation.
+type Velocities = SVector<f64, MOST_COORDINATES>;
+
+/// Returns the changes of all velocities by the jumps of a passage.
+fn changed(system: &System, passage: &Passage, before: &DVector<f64>) -> Velocities {
+    let n = before.len() / 2;
+    let old = Velocities::from_fn(|i, _| if i < n { before[n + i] } else { 0.0 });
+    let mut new = old;
+    for nth in 0.. {
+        let Some(jump) = system.jump(passage, nth, &new.as_slice()[..n]) else { break };
+        jump.add(jump.change, &mut new.as_mut_slice()[..n]);
+    }
+    new - old
 }
 
 /// Returns the state after the jumps of a passage.
 pub(super) fn jumped(system: &System, passage: &Passage, before: &DVector<f64>) -> DVector<f64> {
     let (n, mut state) = (before.len() / 2, before.clone());
-    for nth in 0.. {
-        let Some(jump) = system.jump(passage, nth, &state.as_slice()[n..]) else { break };
-        state.rows_mut(n, n).axpy(jump.change, &jump.kick, 1.0);
-    }
+    let changes = changed(system, passage, before);
+    state.iter_mut().skip(n).zip(&changes).for_each(|(x, change)| *x += change);
     system.shift_back(passage, state.as_mut_slice());
     state
 }
@@ -111,7 +201,15 @@ impl Itinerary {
         let count = first_free + free;
         let mut by = DMatrix::identity(size, count + size);
         by.columns_mut(count, size).fill_with_identity();
-        let mut now = Carried { state: at.start.clone(), by, misfit: DVector::zeros(size) };
+        let mut now = Carried {
+            state: at.start.clone(),
+            memory: by.clone(),
+            by,
+            misfit: DVector::zeros(size),
+            turns: 0.0,
+            turns_by: DVector::zeros(count + size),
+            first_free,
+        };
         let mut linearised = Linearised {
             residual: DVector::zeros(first_free),
             matrix: DMatrix::zeros(first_free, count),
@@ -125,29 +223,28 @@ impl Itinerary {
             later: DMatrix::zeros(events, size),
             known: Vec::new(),
         };
-        let (mut turns, mut turns_by, mut equation) = (0.0, RowDVector::zeros(count + size), size);
-        let mut modes = EquationsByModes::default();
+        let (mut equation, mut known, orders) = (size, KnownLaws::default(), system.orders());
         for (i, passage) in self.passages.iter().enumerate() {
-            let (of_flight, by_parameter) = modes.of(laws, &self.passages, i);
+            let (of_flight, by_parameter) = known.flight(laws, &self.passages, i);
             let mut flight = Flight {
                 equations: of_flight,
                 by_parameter,
-                orders: system.orders(),
+                orders,
                 radian: system.radian(passage) / system.period(),
-                turns: [turns, at.turns[i]],
+                turns: [now.turns, at.turns[i]],
             };
-            let mut end_by = RowDVector::zeros(count + size);
+            let mut end_by = DVector::zeros(count + size);
             if passage.is_event() {
                 end_by[equation] = 1.0;
             } else if passage.is_series() {
                 let duration = |system: &System, state: &DVector<f64>, turns: f64| {
                     system
-                        .rest(passage, &point(system.orders(), state, turns))
+                        .rest(passage, &point(orders, state, turns))
                         .map_or(f64::NAN, |time| time / system.period())
                 };
-                flight.turns[1] = turns + duration(system, &now.state, turns);
-                end_by = series_by(laws, passage, &now, (turns, &turns_by), &duration, first_free);
-                now.jump(laws, passage, first_free);
+                flight.turns[1] = now.turns + duration(system, &now.state, now.turns);
+                end_by = series_by(laws, passage, &now, &duration);
+                now.jump(laws, passage);
             } else {
                 flight.turns[1] = system.known_turns(passage);
                 (0..free).for_each(|j| {
@@ -155,48 +252,46 @@ impl Itinerary {
                 });
             }
             let end = flight.end(&now.state).ok_or(CycleError::TooStiff)?;
+            let turns = flight.turns[1];
             if i == 0 {
                 linearised.rates = end.rates[0].clone();
             }
-            now.by = &end.by_state * (&now.by - &end.rates[0] * &turns_by);
-            for (j, of_free) in end.by_parameter.iter().enumerate() {
-                now.by.column_mut(first_free + j).axpy(1.0, of_free, 1.0);
-            }
-            let condition = system.condition(passage);
-            if let Some(row) = &condition {
-                let point = point(system.orders(), &at.ends[i], flight.turns[1]);
-                let row_of_state = row.rows(0, size);
-                let rate = row_of_state.dot(&end.rates[1]) + drift(system.orders(), row, &point);
+            now.fly(&end);
+            now.misfit += &end.state - &at.ends[i];
+            let condition = known.condition(laws, &self.passages, i);
+            if let Some(function) = condition {
+                let point = point(orders, &at.ends[i], turns);
+                let row_of_state = function.factors.rows(0, size);
+                let rate = row_of_state.dot(&end.rates[1]) + drift(orders, &function.factors, &point);
                 // A touch changes nothing, so its time does not matter to what follows.
-                let rate = if passage.touches().is_some() { f64::INFINITY } else { rate };
+                let rate = if passage.is_touch() { f64::INFINITY } else { rate };
                 linearised.approaches.push(rate);
-                let later = row_of_state.transpose() * now.by.columns(count, size) / -rate;
-                linearised.later.set_row(equation - size, &later);
-                end_by.columns_mut(count, size).copy_from(&later);
+                let later = now.by.columns(count, size).tr_mul(&row_of_state) / -rate;
+                linearised.later.set_row(equation - size, &later.transpose());
+                end_by.rows_mut(count, size).copy_from(&later);
             }
-            now.by += &end.rates[1] * &end_by;
-            now.misfit = &end.by_state * &now.misfit + (&end.state - &at.ends[i]);
-            now.state = at.ends[i].clone();
-            (turns, turns_by) = (flight.turns[1], end_by);
-            if passage.is_event() {
-                let (row, value) = functional(laws, &now, (turns, &turns_by), first_free, &|system| {
-                    system.condition(passage)
-                });
+            now.by.ger(1.0, &end.rates[1], &end_by, 1.0);
+            now.state.copy_from(&at.ends[i]);
+            (now.turns, now.turns_by) = (turns, end_by);
+            if let Some(function) = condition {
+                let (row, value) = now.value(orders, function);
                 linearised.matrix.set_row(equation, &row.columns(0, count));
                 linearised.residual[equation] = value;
                 equation += 1;
             }
-            if passage.touches().is_some() {
-                let (row, value) =
-                    functional(laws, &now, (turns, &turns_by), first_free, &|system| system.rate(passage));
+            let of_touch = || now.value(orders, &Function::of(laws, |system| system.rate(passage)));
+            let of_touch = passage.is_touch().then(of_touch);
+            let of_limit = passage.limit().map(|_| limit(laws, passage, &now).ok_or(CycleError::Diverges));
+            if let Some((row, value)) = of_touch.or(of_limit.transpose()?) {
                 linearised.touches.push((row.columns(0, count).into_owned(), value));
             }
             linearised.ends.push(now.by.columns(0, count).into_owned());
             linearised.misfits.push(now.misfit.clone());
-            linearised.turns.set_row(i, &turns_by.columns(0, count));
+            let of_end = now.turns_by.rows(0, count);
+            linearised.turns.row_mut(i).iter_mut().zip(&of_end).for_each(|(turns, x)| *turns = *x);
             linearised.known.push(turns);
             if !passage.is_series() {
-                now.jump(laws, passage, first_free);
+                now.jump(laws, passage);
             }
         }
         let sign = if self.mirrored { -1.0 } else { 1.0 };
@@ -209,22 +304,18 @@ impl Itinerary {
     }
 }
 
-/// Returns the derivatives of a function of the point where a flight ends by all unknowns, and its value. `row`: its factors.
-fn functional(
-    laws: &Laws,
-    now: &Carried,
-    (turns, turns_by): (f64, &RowDVector<f64>),
-    first_free: usize,
-    row: &dyn Fn(&System) -> Option<DVector<f64>>,
-) -> Extra {
-    let (orders, size) = (laws.system.orders(), now.state.len());
-    let at = point(orders, &now.state, turns);
-    let factors = row(&laws.system).unwrap_or_else(|| DVector::zeros(at.len()));
-    let of_state = factors.rows(0, size);
-    let mut by = of_state.transpose() * &now.by + turns_by * drift(orders, &factors, &at);
-    let value = |system: &System| row(system).map_or(0.0, |row| row.dot(&at));
-    (0..laws.free()).for_each(|j| by[first_free + j] += laws.slope(j, value));
-    (by, factors.dot(&at) + of_state.dot(&now.misfit))
+/// Returns the derivatives of the function of an impact's limit by all unknowns, and its value; none if this impact cannot be at its limit.
+fn limit(laws: &Laws, passage: &Passage, now: &Carried) -> Option<Extra> {
+    let n = now.state.len() / 2;
+    let of = |system: &System| system.limit(passage, &now.state.as_slice()[n..]);
+    let here = of(&laws.system)?;
+    let function = Function::of(laws, |system| of(system).map_or(&here.factors * 0.0, |of| of.factors));
+    let (mut by, linear) = now.value(laws.system.orders(), &function);
+    by += here.row.transpose() * now.by.rows(n, n) * here.slope;
+    for j in 0..laws.free() {
+        by[now.first_free + j] += laws.slope(j, |system| of(system).map_or(0.0, |of| of.value));
+    }
+    Some((by, linear + here.value + here.slope * here.row.dot(&now.misfit.rows(n, n))))
 }
 
 /// Returns the derivatives of the time at which a series of impacts ends.
@@ -232,16 +323,15 @@ fn series_by(
     laws: &Laws,
     passage: &Passage,
     now: &Carried,
-    (turns, turns_by): (f64, &RowDVector<f64>),
     duration: &dyn Fn(&System, &DVector<f64>, f64) -> f64,
-    first_free: usize,
-) -> RowDVector<f64> {
-    let (system, size) = (&laws.system, now.state.len());
+) -> DVector<f64> {
+    let (system, size, turns) = (&laws.system, now.state.len(), now.turns);
     let n = size / 2;
     // A change of the leaving speed is small compared with this speed.
-    let leaving = system
-        .jump(passage, 0, &now.state.as_slice()[n..])
-        .map_or(0.0, |jump| jump.change.abs() / jump.row.amax());
+    let leaving = system.jump(passage, 0, &now.state.as_slice()[n..]).map_or(0.0, |jump| {
+        let largest = jump.row.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        jump.change.abs() / largest
+    });
     let by_entry = |i: usize| {
         let h = DIFFERENCE * if i < n { now.state.rows(0, n).amax() } else { leaving };
         let moved = |by: f64| {
@@ -251,13 +341,15 @@ fn series_by(
         };
         if h > 0.0 { (moved(h) - moved(-h)) / (2.0 * h) } else { 0.0 }
     };
-    let by_state = RowDVector::from_fn(size, |_, i| by_entry(i));
+    let by_state = DVector::from_fn(size, |i, _| by_entry(i));
     let by_turns = (duration(system, &now.state, turns + DIFFERENCE)
         - duration(system, &now.state, turns - DIFFERENCE))
         / (2.0 * DIFFERENCE);
-    let mut by = by_state * &now.by + turns_by * (1.0 + by_turns);
-    (0..laws.free())
-        .for_each(|j| by[first_free + j] += laws.slope(j, |system| duration(system, &now.state, turns)));
+    let mut by = now.by.tr_mul(&by_state);
+    by.axpy(1.0 + by_turns, &now.turns_by, 1.0);
+    for j in 0..laws.free() {
+        by[now.first_free + j] += laws.slope(j, |system| duration(system, &now.state, turns));
+    }
     by
 }
 
@@ -278,6 +370,17 @@ impl Linearised {
     pub(super) fn change(&self, at: &mut Solution, itinerary: &Itinerary, step: &DVector<f64>) {
         at.ends.iter_mut().zip(&self.misfits).for_each(|(end, misfit)| *end += misfit);
         self.shift(at, itinerary, step);
+    }
+
+    /// Returns the rates of change of a solution along a direction of all unknowns.
+    pub(super) fn along(&self, at: &Solution, direction: &DVector<f64>) -> Solution {
+        let free = at.values.len();
+        Solution {
+            start: direction.rows(0, at.start.len()).into_owned(),
+            ends: self.ends.iter().map(|by| by * direction).collect(),
+            turns: (&self.turns * direction).iter().copied().collect(),
+            values: direction.rows(direction.len() - free, free).into_owned(),
+        }
     }
 
     /// Shifts a solution by a step of all unknowns.

@@ -1,6 +1,7 @@
 //! The laws of a model as functions of its parameters.
 
 use std::ops::{Add, Mul, Sub};
+use std::rc::Rc;
 
 use crate::machine::System;
 use crate::model::{Model, ModelError};
@@ -54,9 +55,16 @@ impl Free {
 }
 
 /// The laws of a model with given values, and near them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Laws {
-    pub(super) system: System,
+    pub(super) system: Rc<System>,
+    stencil: Rc<Stencil>,
+}
+
+/// What derivatives are taken from.
+#[derive(Debug)]
+struct Stencil {
+    centre: Rc<System>,
     /// For each free number, systems at other values of it, with their weights in the derivative.
     nearby: Vec<Vec<(f64, System)>>,
 }
@@ -64,15 +72,20 @@ pub(super) struct Laws {
 impl Laws {
     /// Computes the laws of a model, and their derivatives by `free`.
     pub(super) fn new(model: &dyn Model, free: &[Free], slopes: Slopes) -> Result<Laws, ModelError> {
-        let system = System::new(&model.oscillator()?);
+        let system = Rc::new(System::new(&model.oscillator()?));
         let nearby =
             free.iter().map(|&free| nearby(model, &system, free, slopes)).collect::<Result<_, _>>()?;
-        Ok(Laws { system, nearby })
+        Ok(Laws { stencil: Rc::new(Stencil { centre: Rc::clone(&system), nearby }), system })
+    }
+
+    /// Computes the laws of a model with almost the same values. Their derivatives are those of the laws here.
+    pub(super) fn beside(&self, model: &dyn Model) -> Result<Laws, ModelError> {
+        Ok(Laws { system: Rc::new(System::new(&model.oscillator()?)), stencil: Rc::clone(&self.stencil) })
     }
 
     /// Returns the number of free numbers.
     pub(super) fn free(&self) -> usize {
-        self.nearby.len()
+        self.stencil.nearby.len()
     }
 
     /// Returns the derivative of a function of the laws by a free number. What does not depend on this number has the derivative 0 exactly.
@@ -80,8 +93,9 @@ impl Laws {
     where
         T: Clone + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
     {
-        let here = of(&self.system);
-        let terms = self.nearby[free].iter().map(|(weight, system)| (of(system) - here.clone()) * *weight);
+        let here = of(&self.stencil.centre);
+        let terms =
+            self.stencil.nearby[free].iter().map(|(weight, system)| (of(system) - here.clone()) * *weight);
         terms.reduce(Add::add).expect("a stencil has places")
     }
 }

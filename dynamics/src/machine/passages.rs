@@ -13,8 +13,8 @@ use super::impact::Impact;
 use super::modes::Modes;
 use super::motion::SeriesModes;
 use super::watch::{Moment, Roots, Watch};
-use super::{Numbers, WIDTH};
-use crate::model::{MOST_GAPS, Side};
+use super::{Numbers, SIZE, WIDTH};
+use crate::model::{Contact, MOST_GAPS, Side};
 
 /// How an impact changes the gap's rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +66,17 @@ pub enum Touched {
     Friction,
     /// The argument of a curve reaches the end of its piece.
     Piece,
+    /// An impact is at the limit of those after which contact lasts.
+    Limit,
+}
+
+/// What is at its limit at an impact: beyond it, contact lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Limit {
+    /// The leaving speed is that at which contact lasts.
+    Leaving,
+    /// The acceleration towards the wall after the impact is 0.
+    Pressing,
 }
 
 /// A flight and its end.
@@ -79,6 +90,8 @@ pub struct Passage {
     pub turns: f64,
     /// State `(x1, v1, ...)` before the end.
     pub state: Numbers,
+    /// What is at its limit at the impact that ends the flight; none of most.
+    pub(super) limit: Option<Limit>,
 }
 
 impl Passage {
@@ -87,9 +100,14 @@ impl Passage {
         matches!(self.end, End::Event(..) | End::Touch(_))
     }
 
-    /// Returns what the motion touches at the end of the flight.
+    /// Whether the motion touches something at the end of the flight, and nothing changes.
+    pub fn is_touch(&self) -> bool {
+        matches!(self.end, End::Touch(_))
+    }
+
+    /// Returns what the motion touches at the end of the flight, or what is at its limit there.
     pub fn touches(&self) -> Option<Touched> {
-        let End::Touch(watch) = self.end else { return None };
+        let End::Touch(watch) = self.end else { return self.limit.map(|_| Touched::Limit) };
         Some(match watch {
             Watch::Wall(..) => Touched::Wall,
             Watch::OnsetEnds(..) | Watch::Leaves(..) => Touched::Contact,
@@ -105,6 +123,26 @@ impl Passage {
     pub(crate) fn touching(&self) -> Option<Passage> {
         let End::Event(watch, _) = self.end else { return None };
         Some(Passage { end: End::Touch(watch), ..self.clone() })
+    }
+
+    /// Returns the flight up to its impact, with something at its limit there; none if the end is no single impact.
+    pub(crate) fn limited(&self, limit: Limit) -> Option<Passage> {
+        let is_impact = matches!(&self.end, End::Event(_, impulses) if impulses.len() == 1);
+        is_impact.then(|| Passage { limit: Some(limit), ..self.clone() })
+    }
+
+    /// Returns what is at its limit at the impact that ends the flight.
+    pub(crate) fn limit(&self) -> Option<Limit> {
+        self.limit
+    }
+
+    /// Whether another flight of the same modes ends at the same event, with impacts or without.
+    pub(crate) fn meets_event_of(&self, other: &Passage) -> bool {
+        let event = |passage: &Passage| match &passage.end {
+            End::Event(watch, _) | End::Touch(watch) => Some(*watch),
+            _ => None,
+        };
+        self.modes == other.modes && event(self).is_some() && event(self) == event(other)
     }
 
     /// Whether the end is the limit of a series of infinitely many impacts.
@@ -133,15 +171,38 @@ impl Passage {
     }
 }
 
-/// The change of the rates by an impact: the rate of the gap is changed by `change`, which has the derivative `slope` by this rate, and all
-/// other rates by multiples of this.
-pub(crate) struct RateJump {
+/// A function of the point before an impact that is 0 at a limit: a linear one of the point, plus one of the gap's rate.
+pub(crate) struct LimitFunction {
+    /// Factors of the point.
+    pub(crate) factors: DVector<f64>,
     /// Factors of the velocities in the rate of the gap.
     pub(crate) row: DVector<f64>,
+    /// The part that depends on the rate, and its derivative.
+    pub(crate) value: f64,
+    pub(crate) slope: f64,
+}
+
+/// The change of the rates by an impact: the rate of the gap is changed by `change`, which has the derivative `slope` by this rate, and all
+/// other rates by multiples of this.
+pub(crate) struct RateJump<'s> {
+    /// Factors of the velocities in the rate of the gap.
+    pub(crate) row: &'s [f64],
     /// Changes of all velocities if the gap's rate changes by 1.
-    pub(crate) kick: DVector<f64>,
+    pub(crate) kick: Numbers,
     pub(crate) change: f64,
     pub(crate) slope: f64,
+}
+
+impl RateJump<'_> {
+    /// Returns the rate of the gap for given velocities, or another product of the row.
+    pub(crate) fn rate(&self, v: &[f64]) -> f64 {
+        self.row.iter().zip(v).map(|(row, v)| row * v).sum()
+    }
+
+    /// Adds the changes of all velocities if the gap's rate changes by `change`.
+    pub(crate) fn add(&self, change: f64, v: &mut [f64]) {
+        v.iter_mut().zip(&self.kick).for_each(|(v, kick)| *v += kick * change);
+    }
 }
 
 impl System {
@@ -180,9 +241,9 @@ impl System {
         Some(self.in_state(&moment.function(*watch)))
     }
 
-    /// Returns the row of the rate of change, per forcing period, of the function that is 0 at the end of a flight.
-    pub(crate) fn rate(&self, passage: &Passage) -> Option<DVector<f64>> {
-        let row = self.condition(passage)?;
+    /// Returns the row of the rate of change, per forcing period, of the function that is 0 at the end of a flight. It is 0 if the end is no event.
+    pub(crate) fn rate(&self, passage: &Passage) -> DVector<f64> {
+        let Some(row) = self.condition(passage) else { return DVector::zeros(self.state_width()) };
         let (degrees, period) = (self.degrees(), self.period);
         let mut rate = self.accelerations(passage).tr_mul(&row.rows(degrees, degrees)) * period;
         rate.rows_mut(degrees, degrees).axpy(period, &row.rows(0, degrees), 1.0);
@@ -191,19 +252,19 @@ impl System {
             rate[at] += turn * row[at + 1];
             rate[at + 1] -= turn * row[at];
         }
-        Some(rate)
+        rate
     }
 
     /// Returns the nth jump of the velocities at the end of a flight, if there is one; of a series, the jump at its start. `v`: the velocities
     /// before it.
-    pub(crate) fn jump(&self, passage: &Passage, nth: usize, v: &[f64]) -> Option<RateJump> {
+    pub(crate) fn jump(&self, passage: &Passage, nth: usize, v: &[f64]) -> Option<RateJump<'_>> {
         let impulse = match &passage.end {
             End::Event(_, impulses) => *impulses.get(nth)?,
             End::Series(series) if nth == 0 => series.impulse(),
             _ => return None,
         };
-        let (Impulse { gap, side, held, bounce }, degrees) = (impulse, self.degrees());
-        let row = &self.machine.gaps[gap].row;
+        let Impulse { gap, side, held, bounce } = impulse;
+        let row = self.machine.gaps[gap].row.as_slice();
         let rate: f64 = row.iter().zip(v).map(|(row, v)| row * v).sum();
         let (wall, point, approach) = (self.last_wall(gap, side), &[0.0; WIDTH], side.sign() * rate);
         let impact = Impact { system: self, modes: &passage.modes, point, gap, side, wall, approach };
@@ -214,13 +275,51 @@ impl System {
             Bounce::Stops => (1.0, 0.0),
             Bounce::Ends => (1.0 + 2.0 * e / (1.0 - e), 2.0 * by_speed / ((1.0 - e) * (1.0 - e))),
         };
-        let velocity = |i: usize| (0..self.n).map(|j| self.from_flow[(i, j)] * kick[j]).sum();
+        let mut of_velocities = [0.0; SIZE];
+        of_velocities.iter_mut().take(self.degrees()).enumerate().for_each(|(i, of_velocity)| {
+            *of_velocity = (0..self.n).map(|j| self.from_flow[(i, j)] * kick[j]).sum();
+        });
         Some(RateJump {
-            row: row.clone(),
-            kick: DVector::from_fn(degrees, |i, _| velocity(i)),
+            row,
+            kick: of_velocities,
             change: -factor * rate,
             slope: -factor - by_rate * approach,
         })
+    }
+
+    /// Returns the function that is 0 where the impact at the end of a flight is at its limit; none if it cannot be. `v`: the velocities before it.
+    pub(crate) fn limit(&self, passage: &Passage, v: &[f64]) -> Option<LimitFunction> {
+        let End::Event(_, impulses) = &passage.end else { return None };
+        let (limit, Impulse { gap, side, .. }) = (passage.limit?, *impulses.first()?);
+        let row = self.machine.gaps[gap].row.clone();
+        let approach = side.sign() * row.iter().zip(v).map(|(row, v)| row * v).sum::<f64>();
+        match limit {
+            Limit::Leaving => {
+                let wall = self.last_wall(gap, side);
+                let [e, by_speed] = wall.restitution.at(approach.max(0.0));
+                let slope = side.sign() * (e + by_speed * approach);
+                // Without a threshold, or if no impact leaves, there is no such limit.
+                if wall.mesh_speed == 0.0 || slope == 0.0 {
+                    return None;
+                }
+                let factors = DVector::zeros(self.state_width());
+                Some(LimitFunction { factors, row, value: e * approach - wall.mesh_speed, slope })
+            }
+            Limit::Pressing => {
+                let degrees = self.degrees();
+                let factors = self.in_state(&self.domain(&passage.modes).accelerations[gap]) * side.sign();
+                let jump = self.jump(passage, 0, v)?;
+                let of_velocities = &factors.as_slice()[degrees..2 * degrees];
+                let by_change = of_velocities.iter().zip(&jump.kick).map(|(x, kick)| x * kick).sum::<f64>();
+                // On a rigid wall the gap would be at rest.
+                let (change, slope) = match self.last_wall(gap, side).contact {
+                    Contact::Rigid => (-jump.rate(v), -1.0),
+                    _ => (jump.change, jump.slope),
+                };
+                let (value, slope) = (by_change * change, by_change * slope);
+                Some(LimitFunction { factors, row, value, slope })
+            }
+        }
     }
 
     /// Returns the duration of the rest of a series of impacts, for a point in the model's coordinates where the gap has just left its wall;

@@ -141,7 +141,7 @@ fn curves_by_kind(curves: Option<&Curves>) -> Vec<(Kind, Vec<&Curve>)> {
 }
 
 /// Returns the colour of curves of a kind.
-fn curve_color(kind: Kind) -> Color {
+pub fn curve_color(kind: Kind) -> Color {
     match kind {
         Kind::Fold => [0xd5, 0x1f, 0x1f],
         Kind::Flip => [0x10, 0x6b, 0x2c],
@@ -157,7 +157,14 @@ fn curve_color(kind: Kind) -> Color {
 /// Draws a curve with a white rim. Parts of unstable cycles are dashed.
 fn draw_curve(canvas: &Canvas, frame: &Frame, curve: &Curve, color: Color) {
     let path = |points: &[CurvePoint]| -> Vec<Point> {
-        points.iter().map(|point| frame.at(point.values[0], point.values[1])).collect()
+        let ways = points.windows(2).flat_map(|pair| pair[0].way_to(&pair[1]));
+        points
+            .first()
+            .map(|point| point.values)
+            .into_iter()
+            .chain(ways)
+            .map(|[x, y]| frame.at(x, y))
+            .collect()
     };
     canvas.stroke(&path(&curve.points), CURVE_RIM, WHITE);
     let mut start = 0;

@@ -71,6 +71,10 @@ function fitColors() {
 // Colours, ticks and heading of the bar that is shown; none if the layer has no bar.
 /** @type {any} */ let shownBar = null;
 
+// The kinds of the bifurcation curves that are shown, as entries of the legend.
+const curveKinds = () => (showsCurves() ? [...new Map((map.curves?.list ?? []).map(({ kind, color }) => [kind, color]))] : [])
+  .map(([text, color]) => ({ text, color, share: "" }));
+
 /** @type {(layer: Layer) => void} */
 function showBar(current) {
   shownBar = null;
@@ -140,6 +144,13 @@ function showLegend(current) {
     });
     button.setAttribute("aria-pressed", text === isolated);
     item.append(button);
+    return item;
+  }));
+  byId("legend").append(...curveKinds().map(({ text, color }) => {
+    const line = element("span", undefined, "patch line");
+    line.style.background = `#${color}`;
+    const item = element("li");
+    item.append(line, element("span", text), element("span", ""));
     return item;
   }));
   // New records make the list anew. The focus stays on its row.

@@ -81,6 +81,22 @@ async function fill(sheet) {
   return sheet;
 }
 
+// Unpacks the bifurcation curves: each gets the place of its first point among all points, and the rectangle around it.
+async function fillCurves() {
+  if (!map.curves) return;
+  const { list, places, stable } = map.curves;
+  [map.curves.places, map.curves.stable] = await Promise.all([unpack(places), unpack(stable)]);
+  let first = 0;
+  for (const curve of list) {
+    [curve.first, first] = [first, first + curve.count];
+    const [u, v] = [0, 1].map((i) => Array.from({ length: curve.count }, (_, k) => map.curves?.places[2 * (curve.first + k) + i]));
+    const ends = [u, v].map((all) => all.reduce(([low, high], x) => [Math.min(low, x), Math.max(high, x)], [Infinity, -Infinity]));
+    const [[left, right], [bottom, top]] = ends;
+    curve.box = { left, bottom, width: right - left, height: top - bottom };
+  }
+  map.curves.ready = true;
+}
+
 // Returns the value of an axis at an index, which may lie between two cells of a linear or logarithmic axis.
 /** @type {(axis: Axis, i: number) => number} */
 function axisValue({ min, max, count, scale, values }, i) {

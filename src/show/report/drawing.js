@@ -101,6 +101,7 @@ function draw() {
     box(sheet.place, (...at) => pen.drawImage(own.picture, ...at));
   }
   pen.globalAlpha = 1;
+  drawCurves();
   if (pointerCell) frame(rectangle(pointerCell), "#0008", 8);
   if (selectedCell) frame(rectangle(selectedCell), "#000", 8);
   for (const [a, b] of uppermost().data.marks) mark(placeOf(map.axes[0], a), placeOf(map.axes[1], b));
@@ -130,6 +131,81 @@ function frame(around, color, least) {
     pen.strokeStyle = color;
     pen.strokeRect(...at);
   });
+}
+
+// Whether the bifurcation curves are drawn: they belong to the parameters of the program's map.
+const showsCurves = () => Boolean(map.curves?.ready) && byId("show-curves").checked && !isChanged();
+
+// Returns the parts of curves that can be visible, and functions from their places to pixels.
+/** @type {() => { visible: any[], across: (k: number) => number, up: (k: number) => number }} */
+function visibleCurves() {
+  const curves = map.curves;
+  const p = plotArea();
+  const [a, b] = [p.width / view.width, p.height / view.height];
+  const [left, bottom] = [p.x - view.left * a, p.y + p.height + view.bottom * b];
+  const isVisible = (/** @type {Place} */ box) => box.left <= view.left + view.width && box.left + box.width >= view.left
+    && box.bottom <= view.bottom + view.height && box.bottom + box.height >= view.bottom;
+  return {
+    visible: curves && showsCurves() ? curves.list.filter(({ box }) => isVisible(box)) : [],
+    across: (k) => left + curves?.places[2 * k] * a,
+    up: (k) => bottom - curves?.places[2 * k + 1] * b,
+  };
+}
+
+// Draws the bifurcation curves, each with a white rim. Parts of unstable cycles are dashed.
+function drawCurves() {
+  const { visible, across, up } = visibleCurves();
+  const stable = map.curves?.stable;
+  /** @type {(from: number, to: number, width: number, color: string) => void} */
+  const stroke = (from, to, width, color) => {
+    pen.beginPath();
+    for (let k = from; k < to; k++) pen.lineTo(across(k), up(k));
+    pen.lineWidth = width;
+    pen.strokeStyle = color;
+    pen.stroke();
+  };
+  pen.lineJoin = "round";
+  for (const { first, count } of visible) stroke(first, first + count, 3, "#fff");
+  for (const { first, count, color } of visible) {
+    for (let from = first, to = first; from < first + count; from = to) {
+      while (to < first + count && stable[to] === stable[from]) to++;
+      pen.setLineDash(stable[from] ? [] : [4, 3]);
+      stroke(Math.max(from - 1, first), to, 1.5, `#${color}`);
+    }
+  }
+  pen.setLineDash([]);
+}
+
+// Largest distance of the pointer from a curve that it names, in pixels.
+const NEAR = 5;
+
+// Says what the nearest curve at a pixel is; nothing if no curve is near.
+/** @type {(x: number, y: number) => string} */
+function curveAt(x, y) {
+  const { visible, across, up } = visibleCurves();
+  const places = map.curves?.places;
+  let [least, text] = [NEAR, ""];
+  for (const { first, count, kind, period, word } of visible) {
+    for (let k = first + 1; k < first + count; k++) {
+      const [a, b, c, d] = [across(k - 1), up(k - 1), across(k), up(k)];
+      const share = within(((x - a) * (c - a) + (y - b) * (d - b)) / ((c - a) ** 2 + (d - b) ** 2) || 0, 0, 1);
+      const apart = Math.hypot(a + share * (c - a) - x, b + share * (d - b) - y);
+      if (apart >= least) continue;
+      const at = [0, 1].map((i) => places[2 * k - 2 + i] + share * (places[2 * k + i] - places[2 * k - 2 + i]) - 0.5);
+      const values = map.axes.map((axis, i) => `${axis.symbol} = ${Number(valueAt(axis, at[i]).toPrecision(6))}`);
+      least = apart;
+      text = `Curve: ${kind}, cycles of period ${period}, ${word ? `word ${word}` : "no events"}, at ${values.join(", ")}`;
+    }
+  }
+  return text;
+}
+
+// Returns the value of an axis at a place between cells, also between the values of a list.
+/** @type {(axis: Axis, i: number) => number} */
+function valueAt(axis, i) {
+  if (axis.scale !== "values") return axisValue(axis, i);
+  const [low, share] = [Math.floor(i), i - Math.floor(i)];
+  return axis.values[low] + share * ((axis.values[low + 1] ?? axis.values[low]) - axis.values[low]);
 }
 
 // Draws a circle at a position, for a strobe state of an attractor.

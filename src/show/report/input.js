@@ -43,6 +43,8 @@ let moved = 0;
 // The rectangle that is being drawn with the shift key, and the position where it began.
 /** @type {any} */ let drawnRectangle = null;
 /** @type {any} */ let corner = null;
+// What the curve is on which the last click was.
+let chosenCurve = "";
 // The pixel under the pointer; none outside the canvas.
 /** @type {[number, number] | null} */ let hovered = null;
 
@@ -101,7 +103,9 @@ canvas.addEventListener("pointerup", (/** @type {PointerEvent} */ event) => {
     return;
   }
   const cell = cellAt(event.offsetX, event.offsetY);
-  if (moved < 4 && cell) choose(cell);
+  if (moved < 4 && cell) {
+    choose(cell, curveAt(event.offsetX, event.offsetY));
+  }
 });
 canvas.addEventListener("pointercancel", (/** @type {PointerEvent} */ event) => pointers.delete(event.pointerId));
 canvas.addEventListener("pointerleave", () => hover(null));
@@ -110,6 +114,7 @@ canvas.addEventListener("pointerleave", () => hover(null));
 function hover(at = hovered) {
   hovered = at;
   pointerCell = at && cellAt(...at);
+  byId("curve").textContent = (pointerCell && at && curveAt(...at)) || (showsCurves() ? chosenCurve : "");
   updateReadout();
   draw();
 }

@@ -511,7 +511,8 @@ addEventListener("afterprint", () => ink(""));
 
 // Returns what the canvas shows with title and legend on a white ground. The engine draws a figure only of what it computed.
 function titledPicture() {
-  const { entries, title } = layerOf(uppermost());
+  const { entries: own, title } = layerOf(uppermost());
+  const entries = [...own, ...curveKinds()];
   const { fixed } = uppermost().data;
   const { clientWidth: width, clientHeight: height } = canvas;
   const [ratio, top, across] = [canvas.width / width, 52, Math.max(1, Math.floor(width / 260))];
@@ -560,7 +561,8 @@ function wantFigure(ending) {
   employ().catch(failJob);
 }
 byId("save-png").addEventListener("click", () => {
-  if (job && !byId("save-svg").hidden) wantFigure("png");
+  // The engine's figures have no curves.
+  if (job && !byId("save-svg").hidden && !showsCurves()) wantFigure("png");
   else titledPicture().toBlob((/** @type {Blob | null} */ blob) => save(blob, fileName("png")));
 });
 byId("save-model").hidden = !map.model_file;

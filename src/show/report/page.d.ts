@@ -42,7 +42,18 @@ interface MapData {
   marks: [number, number][];
   refinement: Refinement | null;
   validation: Validation | null;
+  // Present if the program has followed the map's curves.
+  curves?: CurveLayer;
 }
+
+// Bifurcation curves. Points of all curves are in one array, in cells of the program's map. `first` is the place of a curve's first point, `box` the rectangle around it.
+type CurveLayer = {
+  list: { kind: string, color: string, period: number, word: string, count: number, first: number, box: Place }[],
+  places: any,
+  // Whether the cycle of each point is stable.
+  stable: any,
+  ready?: boolean,
+};
 
 type Packed = { type: string, data: string };
 

@@ -34,7 +34,12 @@ async function start() {
   if (map.model_file) byId("where").textContent = map.live?.at_once ? "First save the model beside it: Other files of this view." : "Run it in the map's folder.";
   if (map.refinement) showRefinement(map.refinement);
   if (map.validation) showValidation(map.validation);
-  await fill(base);
+  await Promise.all([fill(base), fillCurves()]);
+  byId("curves").hidden = !map.curves;
+  byId("show-curves").addEventListener("change", () => {
+    fitColors();
+    hover();
+  });
   byId("wait").remove();
   readAddress();
   if (isSecond) parent.postMessage({ panel: "ready" }, "*");

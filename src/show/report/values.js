@@ -63,9 +63,10 @@ function updateReadout() {
   compareMotion();
 }
 
-// Selects a cell of a sheet, by default of the program's map, and shows the command that replays it.
-/** @type {(cell: { sheet?: Sheet, i: number, j: number } | null) => void} */
-function choose(cell) {
+// Selects a cell of a sheet, by default of the program's map, and shows the command that replays it. `curve`: what the curve there is.
+/** @type {(cell: { sheet?: Sheet, i: number, j: number } | null, curve?: string) => void} */
+function choose(cell, curve = "") {
+  chosenCurve = byId("curve").textContent = curve;
   selectedCell = cell && { sheet: base, ...cell };
   awaited = null;
   byId("replay").hidden = !cell;
@@ -84,7 +85,7 @@ function choose(cell) {
   }
   showOrbit(selectedCell);
   updateReadout();
-  if (selectedCell) byId("spoken").textContent = facts(selectedCell).filter(([, value]) => value !== undefined).map(([name, value]) => `${name} ${value}`).join(", ");
+  if (selectedCell) byId("spoken").textContent = [curve, ...facts(selectedCell).filter(([, value]) => value !== undefined).map(([name, value]) => `${name} ${value}`)].filter(Boolean).join(", ");
   updateLink();
   draw();
 }

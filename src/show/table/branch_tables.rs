@@ -10,7 +10,7 @@ use crate::show::numbers::Number;
 use rattlemap_dynamics::cycle::Special;
 
 /// Returns the name of a special point in tables.
-pub(super) fn name(kind: Special) -> &'static str {
+fn name(kind: Special) -> &'static str {
     match kind {
         Special::Fold => "fold",
         Special::Flip => "flip",

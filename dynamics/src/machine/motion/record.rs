@@ -33,7 +33,7 @@ impl MachineMotion<'_> {
         let Some(mut passages) = self.passages.take() else { return };
         let (period, modes, state) = (self.period, self.modes, self.state());
         let turns = period as f64 + self.clock.time() / self.system.period;
-        let mut passage = Passage { modes, end, period, turns, state };
+        let mut passage = Passage { modes, end, period, turns, state, limit: None };
         passage.turns = self.system.known_turns(&passage);
         passages.push(passage);
         self.passages = Some(passages);
