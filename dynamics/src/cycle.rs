@@ -10,15 +10,18 @@
 
 mod branch;
 mod curve;
+mod derivative;
 mod equations;
 mod family;
 mod flight;
 mod search;
 
 pub use branch::{
-    Branch, BranchEnd, BranchLimits, BranchPoint, Special, SpecialPoint, follow, follow_on, switch,
+    Branch, BranchEnd, BranchLimits, BranchPoint, CycleFunction, Special, SpecialPoint, follow, follow_on,
+    switch,
 };
 pub use curve::{Condition, Seed, curve};
+pub use derivative::{Derivatives, Kink, Numbers, Slope};
 pub use family::Free;
 pub use search::Cycle;
 
@@ -86,6 +89,14 @@ pub enum CycleError {
     /// Newton's method has not converged.
     #[error("Newton's method does not converge")]
     Diverges,
+    /// There is no derivative, because no cycle at this distance in the parameter has the same flights.
+    #[error(
+        "no cycle with the same sequence of contacts was found within {0:.1e} of this value; the motion may be at a graze or at a fold"
+    )]
+    Changes(f64),
+    /// The computation was halted.
+    #[error("interrupted")]
+    Halted,
 }
 
 /// The sequence of flights of a cycle.

@@ -26,7 +26,8 @@ def curves(
     folder: str,
     kinds: list[str],
     word: str | None,
-    place: str | None,
+    texts: list[str | None],
+    unstable: bool,
     longest: int,
     most_curves: int,
     most_points: int,
@@ -128,6 +129,7 @@ class Orbit:
     state_names: list[str]
     def trajectory(self, samples_per_period: int) -> str: ...
     def spectrum(self) -> str | None: ...
+    def refined(self, period: int | None = ..., word: str | None = ..., by: str | None = ...) -> str: ...
     def history(self, skipped: int, periods: int, samples: int) -> str: ...
 
 def orbit(model: Model, transient: int, periods: int | None = ..., start: list[float] | None = ...) -> Orbit: ...

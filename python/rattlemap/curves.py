@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from io import StringIO
 
+import numpy as np
 import pandas as pd
 
 from . import _native
@@ -25,7 +26,8 @@ class Curves:
         One row per cycle on a curve: ``curve``, ``kind``, ``point``, the values of both axes, ``word``, ``period``, ``stable``, the
         multipliers, ``arclength`` and the state at phase 0.
     meetings
-        One row per point of a curve at which a second condition is met. Its kind is ``with``, or ``border`` if no kind fits.
+        One row per point of a curve at which a second condition is met. Its kind is ``with``, or ``border`` if no kind fits, or
+        ``value`` at a value of ``through``.
     unexplained
         One row per pair of neighbouring cells with different cycles and no curve between them, with the reason. Borders of basins
         are left out.
@@ -47,6 +49,9 @@ def curves(
     longest: int = 4,
     word: str | None = None,
     at: Mapping[str, float] | None = None,
+    condition: tuple[str, float] | None = None,
+    through: Mapping[str, float | Iterable[float]] | None = None,
+    unstable: bool = False,
     most_curves: int = 2000,
     most_points: int = 1000,
     *,
@@ -66,6 +71,14 @@ def curves(
         Word of the cycles that are followed; all if None.
     at
         Values of both axes, such as ``{"e": 0.55, "omega": 5.6}``: begins at the cycle there instead of at all cells.
+    condition
+        A quantity of the map and a value, such as ``("impact_speed_max", 2.0)``: curves on which the quantity has this value are
+        followed, too. Their kind is ``condition``.
+    through
+        Values of axes, such as ``{"omega": [5.5, 6.0]}``, at which points of curves are located. They are rows of ``meetings``
+        with the kind ``value``.
+    unstable
+        Whether cycles are followed on beyond their first change, where they are unstable, to the end of the axis.
     most_curves, most_points
         Largest number of curves, and of points of each part of a curve.
     progress
@@ -99,11 +112,23 @@ def curves(
             raise SceneError(f"{name} = {value}: it must be a whole number from {least} to {most}")
     with reporter(progress, "pairs of cells") as report:
         names = [kinds] if isinstance(kinds, str) else list(kinds)
-        place = None if at is None else ",".join(f"{name}={value!r}" for name, value in at.items())
+        if ("condition" in names) != (condition is not None) and (names or condition is None):
+            raise SceneError("kinds: the kind condition and the argument condition need each other")
+        if at is not None and not at:
+            raise SceneError("at: both axes need a value")
+        value = None if condition is None else "=".join(map(str, condition))
+        texts = [_values(at), value, _values(through)]
         tables, pairs, warnings = _native.curves(
-            os.fspath(folder), names, word, place, longest, most_curves, most_points, report
+            os.fspath(folder), names, word, texts, unstable, longest, most_curves, most_points, report
         )
     warn(warnings)
     frames = [pd.read_csv(StringIO(table), float_precision="round_trip") for table in tables]
     explained, basins = pairs or (None, None)
     return Curves(*frames, explained=explained, basins=basins)
+
+
+def _values(values: Mapping[str, float | Iterable[float]] | None) -> str | None:
+    """Write values of axes as the program reads them; None if there are none."""
+    if not values:
+        return None
+    return ",".join(f"{name}={value!r}" for name, list_ in values.items() for value in np.ravel(list_).astype(float).tolist())

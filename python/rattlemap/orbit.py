@@ -18,7 +18,7 @@ from .model import Model, require_model
 
 #: Ranges of the arguments, as in the program.
 _PERIODS, _TRANSIENT = (2, 10_000_000), (1, 1_000_000_000)
-_HISTORY, _LAST, _POINTS = (1, 10_000), 30_000_000, (1, 10_000_000)
+_HISTORY, _LAST, _POINTS, _CYCLE = (1, 10_000), 30_000_000, (1, 10_000_000), (1, 64)
 
 
 class Orbit:
@@ -258,6 +258,88 @@ class Orbit:
         _check_whole("points", points, _POINTS)
         table = StringIO(self._native.history(int(last) - int(periods), int(periods), int(points)))
         return pd.DataFrame(dataset.table_columns(dataset.text_table(table)))
+
+    def refined(self, period: int | None = None, word: str | None = None, by: str | None = None) -> dict[str, Any]:
+        """Solve the equations of the cycle, so that its numbers are exact to rounding.
+
+        Parameters
+        ----------
+        period, word
+            Length in forcing periods, 1 to 64, and word of another cycle: the nearest one to the start, stable or not. The length
+            is 1 by default if a word is given. Without both it is the cycle that the motion reaches.
+        by
+            Name of a parameter: adds the derivatives by it.
+
+        Returns
+        -------
+        dict
+            ``period``, ``word``, ``stable``, ``floquet`` (multipliers as pairs), ``strobe`` (state at phase 0) and ``event_times``
+            (in forcing periods), and with ``by`` also ``derivatives``: ``strobe``, ``event_times``, ``floquet``, ``quantities``,
+            and ``reasons`` for those that are None.
+
+        Raises
+        ------
+        SceneError
+            For an unknown parameter, or an argument out of its range.
+        EngineError
+            If there is no such cycle, or it has no derivatives, for example at a graze.
+        KeyboardInterrupt
+            Within a second of Ctrl-C.
+
+        Examples
+        --------
+        >>> chaos = rm.orbit(rm.gear_pair(), e=0.8, omega=5.6)
+        >>> chaos.refined(period=1)["stable"]
+        False
+        """
+        if period is not None:
+            _check_whole("period", period, _CYCLE)
+        facts: dict[str, Any] = json.loads(self._native.refined(None if period is None else int(period), word, by))
+        return facts
+
+    def derivative(self, of: str, by: str) -> Any:
+        """Return the derivative of a number of the cycle by a parameter of the model.
+
+        Parameters
+        ----------
+        of
+            ``"strobe"``, ``"event_times"`` or ``"multipliers"``, which have one derivative per entry, or the name of a quantity
+            (see :attr:`quantities`).
+        by
+            Name of the parameter.
+
+        Returns
+        -------
+        float or numpy.ndarray
+            Units are those of the number per those of the parameter. At an end of the parameter's range it is one-sided.
+
+        Raises
+        ------
+        SceneError
+            For an unknown name.
+        EngineError
+            If there is no derivative. The message says why: the motion is no cycle, it is at a graze or a fold, or the slopes on
+            both sides differ, for example because two maxima are equally high.
+
+        Examples
+        --------
+        >>> o = rm.orbit(rm.gear_pair(), e=0.4)
+        >>> round(o.derivative("amplitude_x1", "e"), 6)
+        -0.153629
+        """
+        found = self.refined(by=by)["derivatives"]
+        key = "floquet" if of == "multipliers" else of
+        if key not in ("strobe", "event_times", "floquet") and key not in found["quantities"]:
+            raise SceneError(f"{of}: the motion has strobe, event_times, multipliers, {', '.join(found['quantities'])}")
+        if key in found["reasons"]:
+            raise EngineError(f"{of} by {by}: {found['reasons'][key]}")
+        if key == "floquet":
+            return np.array([complex(*pair) for pair in found[key]], dtype=np.complex128)
+        if key in ("strobe", "event_times"):
+            return np.array(found[key], dtype=np.float64)
+        if found["quantities"][key] is None:
+            raise EngineError(f"{of}: the motion has no such quantity")
+        return float(found["quantities"][key])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that ``rattlemap orbit --json`` prints; absent values are None."""

@@ -9,13 +9,13 @@ use rattlemap::job::compare::CompareJob;
 use rattlemap::job::curves::CurvesJob;
 use rattlemap::job::observer::Observer;
 use rattlemap::job::validate::ValidateJob;
-use rattlemap::map::curves::{Kind, Search};
+use rattlemap::map::curves::{Curves, Kind, Search, Watch};
 use rattlemap::store::finished_map;
 use rattlemap::store::folder::Folder;
 use rattlemap::store::in_memory;
 use rattlemap::store::inventory::Fault;
 
-use rattlemap_dynamics::word::Word;
+use rattlemap::record::Spelling;
 
 use crate::problem::Problem;
 use crate::worker::{self, Collector};
@@ -76,17 +76,18 @@ pub(crate) fn compare(
 /// Tables `curves.csv`, `curve_points.csv` and `unexplained.csv`, numbers of pairs of cells, and warnings.
 type CurveTables = ([String; 3], Option<[usize; 2]>, Vec<String>);
 
-/// Follows the bifurcation curves of a finished map. Returns the tables, and how many pairs of cells have a curve between them and are
+/// Follows the bifurcation curves of a finished map. `texts`: a place, a condition, and values of axes. Returns the tables, and how many pairs of cells have a curve between them and are
 /// borders of basins; none if only some curves were searched.
 #[pyfunction]
-#[pyo3(signature = (folder, kinds, word, place, longest, most_curves, most_points, progress=None))]
+#[pyo3(signature = (folder, kinds, word, texts, unstable, longest, most_curves, most_points, progress=None))]
 #[expect(clippy::too_many_arguments, reason = "they are those of the program")]
 pub(crate) fn curves(
     py: Python<'_>,
     folder: PathBuf,
     kinds: Vec<String>,
     word: Option<&str>,
-    place: Option<String>,
+    texts: [Option<String>; 3],
+    unstable: bool,
     longest: u32,
     most_curves: usize,
     most_points: usize,
@@ -99,14 +100,30 @@ pub(crate) fn curves(
     };
     let kinds = kinds.iter().map(kind).collect::<Result<Vec<_>, _>>()?;
     let word =
-        word.map(|text| text.parse::<Word>().map_err(|error| Problem::scene(format!("word: {error}"))));
+        word.map(|text| text.parse::<Spelling>().map_err(|error| Problem::scene(format!("word: {error}"))));
     let word = word.transpose()?;
     worker::run(py, progress, move |watch| {
         let observer = Collector::new(watch);
         let job = CurvesJob::open(&folder, &observer)?;
-        let from = place.map(|text| CurvesJob::place(job.scene(), &text)).transpose()?;
-        let search = Search { longest, kinds: &kinds, word: word.as_ref(), from, most_curves, most_points };
-        let found = job.find(&search, &|done, count| observer.progress(done, count), watch.halt());
+        let ([place, condition, through], scene) = (texts, job.scene());
+        let through = through.map(|text| CurvesJob::through(scene, &text)).transpose()?.unwrap_or_default();
+        let search = Search {
+            longest,
+            kinds: &kinds,
+            word: word.as_ref(),
+            unstable,
+            condition: condition.map(|text| CurvesJob::condition(scene, &text)).transpose()?,
+            through: &through,
+            from: place.map(|text| CurvesJob::place(scene, &text)).transpose()?,
+            most_curves,
+            most_points,
+        };
+        let hooks = Watch {
+            progress: &|done, count| observer.progress(done, count),
+            found: &|_| (),
+            halt: watch.halt(),
+        };
+        let found = job.find(&search, Curves::default(), &hooks);
         if watch.is_halted() {
             return Ok(None);
         }

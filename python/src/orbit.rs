@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use rattlemap::job;
+use rattlemap::job::refined_cycle::RefineRequest;
 use rattlemap::model::{Model as _, REST, State};
 use rattlemap::model_file::FileModel;
 use rattlemap::motion::Flow;
@@ -71,6 +72,25 @@ impl Orbit {
     fn spectrum(&self, py: Python<'_>) -> PyResult<Option<String>> {
         let (model, orbit) = (self.on_cycle(), Arc::clone(&self.orbit));
         worker::run(py, None, move |_| Ok(Some(in_memory::spectrum(&*model, &orbit)?)))
+    }
+
+    /// Returns the object `refined` of `orbit --json`: the cycle that solves its equations, and its derivatives by a parameter.
+    #[pyo3(signature = (period=None, word=None, by=None))]
+    fn refined(
+        &self,
+        py: Python<'_>,
+        period: Option<u32>,
+        word: Option<&str>,
+        by: Option<String>,
+    ) -> PyResult<String> {
+        let word = word.map(|text| text.parse().map_err(Problem::scene)).transpose()?;
+        let (model, orbit, start) = (self.on_cycle(), Arc::clone(&self.orbit), self.start);
+        by.as_deref().map(|name| model.index(name)).transpose().map_err(Problem::scene)?;
+        worker::run(py, None, move |watch| {
+            let request = RefineRequest { period, word, by };
+            let found = request.find(&*model, (&orbit, &start), watch.halt()).map_err(Problem::engine)?;
+            Ok(found.map(|found| found.object(&*model).to_string()))
+        })
     }
 
     /// Returns `trajectory.csv` of the motion from its start: `periods` forcing periods after the first `skipped`, with at least

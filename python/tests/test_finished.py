@@ -57,7 +57,7 @@ def test_a_validation_is_the_programs(program: Program, tmp_path: Path) -> None:
 
 def test_curves_are_the_programs(program: Program, tmp_path: Path) -> None:
     axes = {"e": (0.5, 0.7, 8), "omega": (5.0, 6.0, 8), "engine": "cpu", "progress": False}
-    rm.map(rm.gear_pair(), **axes, quantities=["class", "symmetric"], out=tmp_path / "map")
+    rm.map(rm.gear_pair(), **axes, quantities=["class", "symmetric", "impact_speed"], out=tmp_path / "map")
     program("curves", tmp_path / "map", "--kind", "pitchfork,grazing", "--out", tmp_path / "curves", "--quiet")
     found = rm.curves(tmp_path / "map", kinds=["pitchfork", "grazing"])
     assert set(found.points["kind"]) == {"pitchfork", "grazing"}
@@ -69,6 +69,16 @@ def test_curves_are_the_programs(program: Program, tmp_path: Path) -> None:
     assert whole.explained and whole.basins is not None and len(whole.points) > len(found.points)
     near = rm.curves(tmp_path / "map", "pitchfork", word="36", at={"e": 0.5, "omega": 5.6})
     assert set(near.points["kind"]) == {"pitchfork"}
+    lines = rm.curves(
+        tmp_path / "map", ["pitchfork", "condition"], condition=("impact_speed", 4.0), through={"omega": [5.5, 5.6]}, unstable=True
+    )
+    assert "condition" in set(lines.points["kind"])
+    at = lines.meetings[lines.meetings["with"] == "value"]
+    assert len(at) and set(at["omega"].round(9)) <= {5.5, 5.6}
+    with pytest.raises(rm.SceneError, match="there is no quantity `q`; the model has impact_speed, "):
+        rm.curves(tmp_path / "map", condition=("q", 1))
+    with pytest.raises(rm.SceneError, match="e needs a number from 0.5 to 0.7"):
+        rm.curves(tmp_path / "map", through={"e": 2})
     with pytest.raises(rm.SceneError, match="word: `138` is no word"):
         rm.curves(tmp_path / "map", word="138")
     with pytest.raises(rm.SceneError, match="kinds: there is no `hopf`; the kinds are fold, "):

@@ -136,3 +136,22 @@ def test_the_exponent_of_a_superstable_cycle_is_minus_infinity_everywhere(progra
     assert line["lyapunov"].values[0] == ds["lyapunov"].values.ravel()[0] == -np.inf
     assert pd.read_csv(tmp_path / "map" / "cells.csv")["lyapunov"][0] == -np.inf
     assert "Lyapunov exponent     -inf" in program("orbit", "--model", "impact-oscillator", "--set", "e=0", "--set", "omega=2.8").stdout
+
+
+def test_derivatives_are_those_of_the_programs_cycle() -> None:
+    chaos = rm.orbit(rm.gear_pair(), e=0.8, omega=5.6)
+    assert chaos.refined(period=1, word="563")["word"] == "356"
+    cycle = rm.orbit(rm.gear_pair(), e=0.4)
+    slope, step = cycle.derivative("amplitude_x1", "e"), 1e-4
+    near = [rm.orbit(rm.gear_pair(), e=0.4 + sign * step).quantities["amplitude_x1"] for sign in (1, -1)]
+    assert slope == pytest.approx((near[0] - near[1]) / (2 * step), rel=1e-5)
+    assert cycle.derivative("strobe", "e").shape == (4,)
+    assert cycle.derivative("multipliers", "e").dtype == complex
+    with pytest.raises(rm.SceneError, match="q: the motion has strobe, event_times, multipliers, impact_speed"):
+        cycle.derivative("q", "e")
+    with pytest.raises(rm.SceneError, match="unknown parameter `q`"):
+        cycle.derivative("strobe", "q")
+    with pytest.raises(rm.EngineError, match="impact_speed_max by T: it has no derivative here"):
+        rm.orbit(rm.load_model("drag-gear")).derivative("impact_speed_max", "T")
+    with pytest.raises(rm.EngineError, match="the motion is not periodic"):
+        chaos.derivative("strobe", "e")

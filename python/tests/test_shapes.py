@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 import rattlemap as rm
 
@@ -75,6 +76,9 @@ def motion(orbit: rm.Orbit) -> None:
         value = getattr(orbit, name)
         if callable(value) and name in ("trajectory", "to_dict"):
             value()
+    if orbit.class_ == "periodic" and orbit.model.name != "two-loose-gears":
+        by = next(iter(orbit.parameters))
+        assert np.isfinite(orbit.derivative("strobe", by)).all()
     assert len(pickle.loads(pickle.dumps(orbit)).events) == len(orbit.events) and repr(orbit)
     table = orbit.history(2, points=50)
     texts = {name for name in table if str(name).split("_")[0] in ("domain", "event", "moment", "element") or name == "gap" and "gap_rate" not in table}

@@ -10,10 +10,12 @@ use crate::cli::say;
 use crate::findings::compare::TOLERANCE;
 use crate::gpu::Precision;
 use crate::job::engine_choice::{AdapterRequest, EngineKind, EngineRequest};
+use crate::job::refined_cycle::RefineRequest;
 use crate::map::curves::Kind;
 use crate::map::scene::{Along, FigureStyle, Format, MAX_PERIODS, toml};
 use crate::map::shard::Shard;
 use crate::model_file::{DEFAULT as DEFAULT_MODEL, FileModel};
+use crate::record::Spelling;
 use crate::show::run_up::Ramp;
 use crate::store::inventory::figure_formats;
 use crate::store::orbit::{HistoryRequest, TABLED};
@@ -160,7 +162,7 @@ fn quote(error: &mut clap::Error) {
 pub(crate) enum Command {
     Map(Map),
     Merge(Merge),
-    Orbit(Orbit),
+    Orbit(Box<Orbit>),
     Bifurcation(Bifurcation),
     Explore(Explore),
     Models(Models),
@@ -600,6 +602,11 @@ pub(crate) struct Orbit {
     #[arg(long, value_name = "WORD", requires = "refine")]
     pub(crate) word: Option<Word>,
 
+    /// With --refine: also the derivatives of the cycle by this parameter: of its state, times, multipliers and all quantities. Example:
+    /// --refine --by e
+    #[arg(long, value_name = "NAME", requires = "refine")]
+    pub(crate) by: Option<String>,
+
     /// Print a JSON object instead of a summary
     #[arg(long)]
     pub(crate) json: bool,
@@ -667,6 +674,11 @@ impl Orbit {
             format!("--to-period {last}: {periods} periods end at period {periods} or later; give --from-start {last} or less")
         })?;
         Ok(Some(HistoryRequest { start: self.start(), skipped, periods, samples: TABLED }))
+    }
+
+    /// The cycle that --refine requests.
+    pub(crate) fn refined(&self) -> RefineRequest {
+        RefineRequest { period: self.period, word: self.word.clone(), by: self.by.clone() }
     }
 
     /// The requested run-up.
@@ -959,7 +971,7 @@ pub(crate) struct Compare {
 /// both axes. Each point solves the equations of the cycle to rounding, and its motion was run again: it has the same events.
 /// docs/curves.md explains the kinds. Writes curves.csv (one row per point), curve_points.csv (where two conditions meet),
 /// unexplained.csv (pairs of neighbours without a curve), curves.png (the map with its curves), report.html (the page of the map
-/// with its curves) and manifest.json. Ctrl-C keeps the curves that are found.
+/// with its curves) and manifest.json. Ctrl-C keeps the curves that are found, and --resume goes on.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
     rattlemap curves scenes/e_omega.toml\n  \
@@ -969,13 +981,25 @@ pub(crate) struct Curves {
     #[arg(value_name = "DIR|SCENE")]
     pub(crate) map: PathBuf,
 
-    /// Kinds of curves: fold, flip, pitchfork, grazing, meshing_grazing, meshing_border, contact_end, sticking [default: all]
+    /// Kinds of curves: fold, flip, pitchfork, grazing, meshing_grazing, meshing_border, contact_end, sticking, condition [default: all]
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kind)]
     pub(crate) kind: Vec<Kind>,
 
     /// Follow only cycles with this word, the order of their contacts. `rattlemap orbit` prints the word of a motion
     #[arg(long, value_name = "WORD")]
-    pub(crate) word: Option<Word>,
+    pub(crate) word: Option<Spelling>,
+
+    /// Also follow each cycle beyond its first change, where it is unstable, to the end of the axis, and the curves that it meets there
+    #[arg(long)]
+    pub(crate) unstable: bool,
+
+    /// Also follow the curves on which a quantity of the map has this value. Example: --condition impact_speed_max=2
+    #[arg(long, value_name = "QUANTITY=VALUE")]
+    pub(crate) condition: Option<String>,
+
+    /// Locate the points of curves at these values of an axis, and list them in curve_points.csv. Example: --through omega=5.5,omega=6
+    #[arg(long, value_name = "NAME=VALUE,...")]
+    pub(crate) through: Option<String>,
 
     /// Begin at the cycle that the map's start reaches at these values, instead of at all cells. The first curve in each direction along
     /// both axes is followed. Example: --from e=0.55,omega=5.6
@@ -1002,6 +1026,10 @@ pub(crate) struct Curves {
     /// Example: --format png,pdf
     #[arg(long, value_name = "FORMAT,...", value_enum, value_delimiter = ',')]
     pub(crate) format: Vec<Format>,
+
+    /// Go on with a search that was interrupted, with the same options
+    #[arg(long, conflicts_with = "force")]
+    pub(crate) resume: bool,
 
     /// Replace the files of an earlier run in the folder. Without this option the folder must be empty
     #[arg(long)]

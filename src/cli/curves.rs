@@ -1,8 +1,9 @@
 //! `rattlemap curves`: follows the borders between the regions of a finished map.
 
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::arguments::{Curves, Map, figures_and_added};
 use super::console::Console;
@@ -11,36 +12,71 @@ use super::interrupt::Interrupt;
 use super::progress::Progress;
 use super::say;
 use crate::job::curves::CurvesJob;
+use crate::job::error::JobError;
 use crate::job::scene_file::SceneFile;
-use crate::map::curves::{self, Kind, Search};
+use crate::map::curves::{self, Kind, Search, Watch, With};
+use crate::map::scene::Scene;
 use crate::store;
 use crate::store::folder::Folder;
+use anyhow::anyhow;
 use rattlemap_dynamics::number::significant;
+use serde_json::{Value, json};
+
+/// Time after which a search stores what it has found.
+const SAVED: Duration = Duration::from_secs(5);
 
 /// Number of failures that a message lists; the manifest lists all.
 const LISTED: usize = 4;
 
 /// Reads the map, finds its curves, and writes them.
 pub(crate) fn run(arguments: &Curves) -> Result<(), Failure> {
+    let wants = arguments.kind.is_empty() || arguments.kind.contains(&Kind::Condition);
+    let needs = arguments.kind.contains(&Kind::Condition);
+    if needs && arguments.condition.is_none() || arguments.condition.is_some() && !wants {
+        let text = "the kind condition and the option --condition need each other";
+        return Err(Failure::Usage(anyhow!(text)));
+    }
     let out = arguments.out();
     let map = if arguments.map.is_file() { make_map(arguments, &out)? } else { arguments.map.clone() };
     let clock = Instant::now();
     let interrupt = Interrupt::listen(arguments.quiet)?;
     let job = CurvesJob::open(&map, &Console::new(arguments.quiet, "", false))?;
-    let folder = Folder::open(&out, arguments.force)?;
+    let of = arguments.search(job.scene());
+    let known = if arguments.resume { store::curves::saved(&out, &of) } else { None };
+    let folder = Folder::open(&out, arguments.force || known.is_some())?;
     folder.prepare(store::curves::names())?;
+    let through = read(&arguments.through, |text| CurvesJob::through(job.scene(), text))?.unwrap_or_default();
     let search = Search {
         longest: arguments.longest,
         kinds: &arguments.kind,
         word: arguments.word.as_ref(),
-        from: arguments.from.as_deref().map(|text| CurvesJob::place(job.scene(), text)).transpose()?,
+        unstable: arguments.unstable,
+        condition: read(&arguments.condition, |text| CurvesJob::condition(job.scene(), text))?,
+        through: &through,
+        from: read(&arguments.from, |text| CurvesJob::place(job.scene(), text))?,
         most_curves: arguments.most_curves as usize,
         most_points: arguments.most_points as usize,
     };
     let unit = if search.from.is_some() { "directions" } else { "pairs of cells" };
     let progress = Progress::new(1, 0, unit, arguments.quiet);
-    let report = |done: usize, count: usize| progress.report(done, count.max(1));
-    let found = job.find(&search, &report, interrupt.raised());
+    let (saved, latest) = (Cell::new(Instant::now()), RefCell::new(known.clone().unwrap_or_default()));
+    let save = |found: &curves::Curves| {
+        if !interrupt.is_raised() && saved.get().elapsed() > SAVED {
+            // A search goes on without this file, too.
+            store::curves::save(&folder, &of, found).unwrap_or_default();
+            saved.set(Instant::now());
+            *latest.borrow_mut() = found.clone();
+        }
+    };
+    let watch = Watch {
+        progress: &|done: usize, count: usize| progress.report(done, count.max(1)),
+        found: &save,
+        halt: interrupt.raised(),
+    };
+    let found = job.find(&search, known.unwrap_or_default(), &watch);
+    if interrupt.is_raised() {
+        store::curves::save(&folder, &of, &latest.borrow())?;
+    }
     let elapsed = clock.elapsed();
     let (cells, layers) = (job.cells(), job.layers());
     let formats = figures_and_added(&arguments.format, folder.path(), "curves");
@@ -57,23 +93,39 @@ pub(crate) fn run(arguments: &Curves) -> Result<(), Failure> {
         say::removed(&folder);
     }
     if interrupt.is_raised() {
-        return Err(interrupt.failure("interrupted; the curves that were found are written".to_owned()));
+        let text = "interrupted; the curves that were found are written, and --resume finds the others";
+        return Err(interrupt.failure(text.to_owned()));
     }
-    Ok(())
+    Ok(store::curves::forget(&folder)?)
+}
+
+/// Reads the text of an option, if it is given.
+fn read<T>(text: &Option<String>, of: impl Fn(&str) -> Result<T, JobError>) -> Result<Option<T>, JobError> {
+    text.as_deref().map(of).transpose()
 }
 
 /// Computes the map of a scene into its default folder, or completes it there. Returns the folder. `out`: the folder of the curves.
 fn make_map(arguments: &Curves, out: &Path) -> Result<PathBuf, Failure> {
     let scene = SceneFile::map(&arguments.map).load(&[])?;
     CurvesJob::require(&scene, &arguments.map)?;
-    arguments.from.as_deref().map(|text| CurvesJob::place(&scene, text)).transpose()?;
-    Folder::check(out, arguments.force, store::curves::names())?;
+    read(&arguments.from, |text| CurvesJob::place(&scene, text))?;
+    read(&arguments.through, |text| CurvesJob::through(&scene, text))?;
+    read(&arguments.condition, |text| CurvesJob::condition(&scene, text))?;
+    Folder::check(out, arguments.force || arguments.resume, store::curves::names())?;
     let map = Map::of_scene(&arguments.map, arguments.quiet);
     super::map::run(&map)?;
     Ok(map.out())
 }
 
 impl Curves {
+    /// Describes the search, so that it is resumed only with the same options and the same map.
+    fn search(&self, scene: &Scene) -> Value {
+        let kinds: Vec<&str> = self.kind.iter().map(|kind| kind.name()).collect();
+        let word = self.word.as_ref().map(|word| word.text());
+        let texts = [&self.from, &self.condition, &self.through];
+        json!([scene.identity(), kinds, word, texts, self.unstable, self.longest, self.most_points])
+    }
+
     /// The folder to write to.
     fn out(&self) -> PathBuf {
         let name = if self.map.is_file() { self.map.file_stem() } else { self.map.file_name() };
@@ -108,8 +160,9 @@ fn summary(found: &curves::Curves, axes: [&str; 2], seconds: f64) -> String {
             100.0 * explained as f64 / all as f64
         ));
     }
-    if !found.meetings.is_empty() {
-        lines.push(format!("at {} points of curves another condition is met, too", found.meetings.len()));
+    let count = found.meetings.iter().filter(|meeting| meeting.with != With::Value).count();
+    if count > 0 {
+        lines.push(format!("at {count} points of curves another condition is met, too"));
     }
     let failure = |(kind, [x, y], reason): &(Kind, [f64; 2], String)| {
         let [a, b] = axes;

@@ -1,12 +1,10 @@
 //! `rattlemap orbit`: computes and describes one motion.
 
 use std::cell::OnceCell;
-use std::fmt::Display;
 use std::time::{Duration, Instant};
 
 use anyhow::anyhow;
-use rattlemap_dynamics::cycle::Cycle;
-use rattlemap_dynamics::model::{Model, State, Timing};
+use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{self, Class, LONGEST_TIME};
 
@@ -19,7 +17,7 @@ use crate::cli::say;
 use crate::job::model_choice;
 use crate::map::scene::{self, Format};
 use crate::show::orbit_json::{history_to_json, to_json};
-use crate::show::orbit_summary::{cycle_summary, history_summary, run_up_summary, summary, timing};
+use crate::show::orbit_summary::{history_summary, run_up_summary, summary, timing};
 use crate::show::run_up::Ramp;
 use crate::store;
 use crate::store::error::OutputError;
@@ -37,6 +35,7 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
         model_choice::check_components(&model, start.count)?;
     }
     let model = scene::single_cell(&model, &arguments.set)?;
+    arguments.by.as_deref().map(|name| model.index(name)).transpose().map_err(ModelError::from)?;
     if let Some(ramp) = arguments.ramp().map_err(|text| Failure::Usage(anyhow!(text)))? {
         return run_up(arguments, &*model, ramp, &style);
     }
@@ -86,14 +85,17 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     }
     let orbit = orbit?.ok_or_else(stopped)?;
     let model = model.on_cycle(orbit.cycle_time);
-    let refined = match arguments.refine {
-        true => Some(refine(arguments, &*model, &orbit, &interrupt)?.ok_or_else(stopped)?),
-        false => None,
+    let refine = || arguments.refined().find(&*model, (&orbit, &start), interrupt.raised());
+    // Without such a cycle the motion is printed all the same.
+    let (refined, failure) = match arguments.refine.then(refine).transpose() {
+        Ok(Some(None)) => return Err(stopped()),
+        Ok(refined) => (refined.flatten(), None),
+        Err(error) => (None, Some(Failure::Run(anyhow!("--refine: {error}")))),
     };
     print(&match arguments.json {
         true => to_json(&*model, &orbit, instant, refined.as_ref()),
         false => {
-            let cycle = refined.as_ref().map(|cycle| cycle_summary(&*model, cycle)).unwrap_or_default();
+            let cycle = refined.as_ref().map(|refined| refined.summary(&*model)).unwrap_or_default();
             broken(&(summary(&*model, &orbit, instant) + &cycle))
         }
     })?;
@@ -101,32 +103,8 @@ pub(crate) fn run(arguments: &Orbit) -> Result<(), Failure> {
     finish(arguments, folder, &style, |folder, figures| {
         store::orbit::write(folder, &*model, &orbit, &request, figures)
     })?;
-    fail_if(orbit.class == Class::Failed, "the integration failed; `status` says why")
-}
-
-/// Solves the equations of the cycle that is asked for. None after a signal.
-fn refine(
-    arguments: &Orbit,
-    model: &dyn Model,
-    orbit: &orbit::Orbit,
-    interrupt: &Interrupt,
-) -> Result<Option<Cycle>, Failure> {
-    let fails = |reason: &dyn Display| Failure::Run(anyhow!("--refine: {reason}"));
-    if arguments.period.is_none() && arguments.word.is_none() {
-        let Class::Periodic { period } = orbit.class else {
-            return Err(fails(&"the motion is not periodic; --period N asks for an unstable cycle"));
-        };
-        return Cycle::near(model, &orbit.strobe, period).map(Some).map_err(|error| fails(&error));
-    }
-    if timing(model) != Timing::Forced {
-        return Err(fails(&"only a model with a force has cycles of a given period"));
-    }
-    let kind = (arguments.period.unwrap_or(1), arguments.word.as_ref());
-    let found = Cycle::nearest(model, &arguments.start(), kind, interrupt.raised());
-    match found.map_err(|error| fails(&error))? {
-        None if !interrupt.is_raised() => Err(fails(&"no such cycle was found near the motion")),
-        found => Ok(found),
-    }
+    fail_if(orbit.class == Class::Failed, "the integration failed; `status` says why")?;
+    failure.map_or(Ok(()), Err)
 }
 
 /// Computes and writes a run-up.

@@ -1,15 +1,16 @@
 //! Finds the bifurcation curves of a finished map.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 use serde_json::Value;
 
 use crate::job::error::JobError;
 use crate::job::finished::{self, LoadedMap};
 use crate::job::observer::Observer;
-use crate::map::curves::{self, Curves, Search};
+use crate::map::curves::{self, Curves, Search, Watch};
 use crate::map::scene::{Quantity, Scene};
+use crate::model_file::subjects;
+use crate::record::measures::{self, Measure};
 use crate::show::cells::{Cells, Survey};
 use crate::show::layers::{self, Layer};
 use crate::show::{report, words};
@@ -89,32 +90,78 @@ impl CurvesJob {
     /// # Errors
     /// [`JobError`] if an axis has no value, or none within its range.
     pub fn place(scene: &Scene, text: &str) -> Result<[f64; 2], JobError> {
-        let refuse = |reason: String| JobError::Usage(format!("--from {text}: {reason}"));
         let mut values = [None; 2];
-        for part in text.split(',') {
-            let (name, value) =
-                part.split_once('=').ok_or_else(|| refuse(format!("`{part}` is not NAME=VALUE")))?;
-            let axes = scene.axes();
-            let at = axes.iter().position(|axis| axis.parameter().name == name.trim());
-            let at = at.ok_or_else(|| refuse(format!("the map has no axis `{}`", name.trim())))?;
-            let (value, axis) = (value.trim().parse::<f64>().ok(), &axes[at]);
-            let inside = value.filter(|value| (axis.min()..=axis.max()).contains(value));
-            let range = || format!("{} needs a number from {} to {}", name.trim(), axis.min(), axis.max());
-            values[at] = Some(inside.ok_or_else(|| refuse(range()))?);
+        for (axis, value) in on_axes(scene, "--from", text)? {
+            values[axis] = Some(value);
         }
         match values {
             [Some(x), Some(y)] => Ok([x, y]),
-            _ => Err(refuse("both axes need a value".to_owned())),
+            _ => Err(JobError::Usage(format!("--from {text}: both axes need a value"))),
         }
     }
 
-    /// Finds the curves. `progress` gets the number of examined pairs of cells, and of all. What is found when `halt` is raised is kept.
-    pub fn find(
-        &self,
-        search: &Search<'_>,
-        progress: &(dyn Fn(usize, usize) + Sync),
-        halt: &AtomicBool,
-    ) -> Curves {
-        curves::curves(&self.scene, &self.loaded.plan, &self.loaded.stored.records, search, progress, halt)
+    /// Reads the values `NAME=VALUE,...` of axes at which points of curves are located: axes and values.
+    ///
+    /// # Errors
+    /// [`JobError`] if a value is not in the range of an axis.
+    pub fn through(scene: &Scene, text: &str) -> Result<Vec<(usize, f64)>, JobError> {
+        on_axes(scene, "--through", text)
     }
+
+    /// Reads a condition `QUANTITY=VALUE`.
+    ///
+    /// # Errors
+    /// [`JobError`] if the map has no such quantity.
+    pub fn condition(scene: &Scene, text: &str) -> Result<(Measure, f64), JobError> {
+        let refuse = |reason: String| JobError::Usage(format!("--condition {text}: {reason}"));
+        let parts =
+            text.split_once('=').and_then(|(name, value)| Some((name.trim(), value.trim().parse().ok()?)));
+        let (name, value): (&str, f64) = parts
+            .filter(|(_, value): &(_, f64)| value.is_finite())
+            .ok_or_else(|| refuse("it is not QUANTITY=VALUE".to_owned()))?;
+        let names = subjects(scene.base());
+        let quantities = &scene.outputs().quantities;
+        let is_there =
+            |measure: &Measure| quantities.iter().any(|quantity| quantity.name() == measure.group.name);
+        let known: Vec<Measure> =
+            measures::all().chain(measures::of_gaps()).filter(|measure| measure.is_of(&names)).collect();
+        let Some(measure) = known.iter().find(|measure| measure.name(&names) == name) else {
+            let list: Vec<String> = known.iter().map(|measure| measure.name(&names)).collect();
+            return Err(refuse(format!("there is no quantity `{name}`; the model has {}", list.join(", "))));
+        };
+        if measure.group.name == "multiplier" {
+            return Err(refuse(
+                "a multiplier is no condition; a fold or a flip has the multiplier 1 or -1".to_owned(),
+            ));
+        }
+        if !is_there(measure) {
+            let quantity = measure.group.name;
+            return Err(refuse(format!(
+                "the map has no {name}; add \"{quantity}\" to outputs.quantities and make the map again"
+            )));
+        }
+        Ok((*measure, value))
+    }
+
+    /// Finds the curves. What is found when `halt` is raised is kept. `known`: what an interrupted search has found.
+    pub fn find(&self, search: &Search<'_>, known: Curves, watch: &Watch<'_>) -> Curves {
+        curves::curves(&self.scene, &self.loaded.plan, &self.loaded.stored.records, search, known, watch)
+    }
+}
+
+/// Reads values of axes of a scene from a text `NAME=VALUE,...`. `option` begins messages.
+fn on_axes(scene: &Scene, option: &str, text: &str) -> Result<Vec<(usize, f64)>, JobError> {
+    let refuse = |reason: String| JobError::Usage(format!("{option} {text}: {reason}"));
+    let read = |part: &str| {
+        let (name, value) =
+            part.split_once('=').ok_or_else(|| refuse(format!("`{part}` is not NAME=VALUE")))?;
+        let axes = scene.axes();
+        let at = axes.iter().position(|axis| axis.parameter().name == name.trim());
+        let at = at.ok_or_else(|| refuse(format!("the map has no axis `{}`", name.trim())))?;
+        let (value, axis) = (value.trim().parse::<f64>().ok(), &axes[at]);
+        let inside = value.filter(|value| (axis.min()..=axis.max()).contains(value));
+        let range = || format!("{} needs a number from {} to {}", name.trim(), axis.min(), axis.max());
+        Ok((at, inside.ok_or_else(|| refuse(range()))?))
+    };
+    text.split(',').map(read).collect()
 }

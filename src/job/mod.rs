@@ -17,6 +17,7 @@ pub mod model_engine;
 pub mod models;
 pub mod observer;
 pub mod processor;
+pub mod refined_cycle;
 pub mod run;
 pub mod scene_file;
 pub mod size;

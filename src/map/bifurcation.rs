@@ -234,7 +234,7 @@ impl Column {
     /// Builds the column of a cycle on a branch, with its multipliers.
     pub(crate) fn on_branch(
         value: f64,
-        (period, forcing_period): (u32, f64),
+        (period, forcing_period, cycle_time): (u32, f64, Option<f64>),
         word: Word,
         state: State,
         quantities: Option<&Quantities>,
@@ -253,7 +253,7 @@ impl Column {
             impacts_per_period: impacts,
             mesh_fraction: f64::NAN,
             impact_rate: impacts / forcing_period,
-            measures: Measured { quantities, multiplier, cycle_time: None }.numbers(),
+            measures: Measured { quantities, multiplier, cycle_time }.numbers(),
             state: Some(state),
             symmetric: None,
             word: Some(word),

@@ -6,7 +6,7 @@ use crate::map::bifurcation::Column;
 use rattlemap_dynamics::cycle::{
     Branch, BranchEnd, BranchLimits, BranchPoint, CycleError, Itinerary, Special, follow_on, switch,
 };
-use rattlemap_dynamics::model::{Model, ModelError, State};
+use rattlemap_dynamics::model::{Model, ModelError, State, Timing};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, quantities_on};
 use rattlemap_dynamics::word::Word;
@@ -79,7 +79,7 @@ pub fn branches(
                     let periods = match special.kind {
                         Special::Flip => 2 * period,
                         Special::Pitchfork => period,
-                        Special::Fold | Special::Grazing | Special::Border => continue,
+                        Special::Fold | Special::Grazing | Special::Border | Special::Value => continue,
                     };
                     if periods > LONGEST || count + found.len() >= MOST_BRANCHES {
                         continue;
@@ -220,16 +220,23 @@ fn row(
     if let [time, _] = point.solution.values() {
         model.set_cycle_time(*time);
     }
-    let (flow, state) = (Flow::of(&*model)?, point.solution.state());
-    let quantities = quantities_on(&flow, model.law(), state, period);
-    let column = Column::on_branch(
-        point.value,
-        (period, flow.period),
-        word.clone(),
-        state,
-        quantities.as_ref(),
-        &point.multipliers,
-    );
+    let cycle = (period, word, point.solution.state(), &point.multipliers[..]);
+    let column = measured(&*model, point.value, cycle)?;
     let (stable, multipliers) = (point.is_stable(), point.multipliers.clone());
     Ok(BranchRow { branch, arclength, stable, multipliers, column, special })
+}
+
+/// Measures a cycle, stable or not, from its period, word, state at phase 0 and multipliers. The model has the time of a cycle without force.
+///
+/// # Errors
+/// [`ModelError`] if the model is not valid.
+pub fn measured(
+    model: &dyn Model,
+    value: f64,
+    (period, word, state, multipliers): (u32, &Word, State, &[[f64; 2]]),
+) -> Result<Column, ModelError> {
+    let flow = Flow::of(model)?;
+    let quantities = quantities_on(&flow, model.law(), state, period);
+    let times = (period, flow.period, (flow.timing == Timing::Cycle).then_some(flow.period));
+    Ok(Column::on_branch(value, times, word.clone(), state, quantities.as_ref(), multipliers))
 }

@@ -7,20 +7,23 @@ use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::map::plan::Plan;
 use crate::map::random::Random;
 use crate::map::scene::{Axis, Scene};
 use crate::record::classify::classify;
-use crate::record::{Record, Records};
+use crate::record::measures::{Measure, Measured};
+use crate::record::{Record, Records, Spelling};
 use rattlemap_dynamics::cycle::{
-    Branch, BranchEnd, BranchLimits, BranchPoint, Condition, CycleError, Itinerary, Seed, Special,
-    SpecialPoint, curve, follow_on,
+    Branch, BranchEnd, BranchLimits, BranchPoint, Condition, CycleError, CycleFunction, Itinerary, Seed,
+    Solution, Special, SpecialPoint, curve, follow_on,
 };
 use rattlemap_dynamics::machine::Touched;
-use rattlemap_dynamics::model::{Model, State};
+use rattlemap_dynamics::model::{Model, State, Timing};
+use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::named;
-use rattlemap_dynamics::orbit::{Class, analyse};
+use rattlemap_dynamics::orbit::{Class, EVENT_PERIODS, LONGEST_WINDOW, analyse_until, quantities_on};
 use rattlemap_dynamics::word::Word;
 
 /// Steps along the way between two cells: the first, least and largest one, relative to the way, and the largest number of points.
@@ -73,6 +76,34 @@ named! {
         ContactEnd = "contact_end",
         /// A sliding rate or a holding force is at its limit.
         Sticking = "sticking",
+        /// A quantity has a given value.
+        Condition = "condition",
+    }
+}
+
+impl Serialize for Kind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for Kind {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Kind, D::Error> {
+        Kind::named(&String::deserialize(deserializer)?)
+            .ok_or_else(|| de::Error::custom("there is no such kind"))
+    }
+}
+
+/// Words as their symbols in order of time.
+mod spelled {
+    use super::*;
+
+    pub(super) fn serialize<S: Serializer>(word: &Word, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&word.time_order())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Word, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
     }
 }
 
@@ -87,6 +118,7 @@ impl Kind {
                 Some(Kind::ContactEnd)
             }
             Condition::Touch => Kind::touching(seed.touched()?),
+            Condition::Value => Some(Kind::Condition),
         }
     }
 
@@ -100,20 +132,43 @@ impl Kind {
             Touched::Piece => None,
         }
     }
+}
 
-    /// Returns the kind of the other curve at a special point of a curve; none if the sequence of flights changes in another way.
-    fn meeting(special: &SpecialPoint) -> Option<Kind> {
-        match special.kind {
+/// What else holds at a point of a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum With {
+    /// The condition of another kind of curve.
+    Kind(Kind),
+    /// The sequence of flights changes in a way that has no kind.
+    Border,
+    /// A parameter has a requested value.
+    Value,
+}
+
+impl With {
+    fn of(special: &SpecialPoint) -> With {
+        let kind = match special.kind {
             Special::Fold => Some(Kind::Fold),
             Special::Flip => Some(Kind::Flip),
             Special::Pitchfork => Some(Kind::Pitchfork),
-            Special::Grazing | Special::Border => Kind::touching(special.meets?),
+            Special::Grazing | Special::Border => special.meets.and_then(Kind::touching),
+            Special::Value => return With::Value,
+        };
+        kind.map_or(With::Border, With::Kind)
+    }
+
+    /// Returns its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            With::Kind(kind) => kind.name(),
+            With::Border => "border",
+            With::Value => "value",
         }
     }
 }
 
 /// A cycle on a curve.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// Values of the two axes.
     pub values: [f64; 2],
@@ -129,30 +184,31 @@ pub struct CurvePoint {
     pub stable: bool,
 }
 
-/// A point at which the condition of another kind is met, too.
-#[derive(Clone, Debug)]
+/// A point at which something else holds, too.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Meeting {
     /// Number of the curve, from 1.
     pub curve: usize,
-    /// The kind of the other condition; none if the sequence of flights changes in another way.
-    pub with: Option<Kind>,
+    /// What else holds.
+    pub with: With,
     /// The cycle.
     pub at: CurvePoint,
 }
 
 /// A bifurcation curve.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Curve {
     /// What happens on it.
     pub kind: Kind,
     /// Word of the cycle at which it was found.
+    #[serde(with = "spelled")]
     pub word: Word,
     /// Period of the cycles, in forcing periods.
     pub period: u32,
     /// The cycles, in order.
     pub points: Vec<CurvePoint>,
     /// Why it ends, at the first and at the last point.
-    pub ends: [&'static str; 2],
+    pub ends: [String; 2],
 }
 
 impl CurvePoint {
@@ -203,19 +259,22 @@ pub struct Unexplained {
 }
 
 /// All curves of a map.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Curves {
     /// The curves.
     pub curves: Vec<Curve>,
     /// Points where two conditions meet.
     pub meetings: Vec<Meeting>,
     /// What lies between neighbouring cells; none if only some curves are searched.
+    #[serde(skip)]
     pub pairs: Option<Pairs>,
     /// Pairs without a curve.
+    #[serde(skip)]
     pub unexplained: Vec<Unexplained>,
     /// Seeds that could not be followed, with their kinds and places.
     pub failures: Vec<(Kind, [f64; 2], String)>,
     /// Why a search from given values met nothing in a direction.
+    #[serde(skip)]
     pub nothing: Option<&'static str>,
 }
 
@@ -227,7 +286,13 @@ pub struct Search<'a> {
     /// Kinds of curves; all if empty.
     pub kinds: &'a [Kind],
     /// Word of the cycles that are followed; none follows all.
-    pub word: Option<&'a Word>,
+    pub word: Option<&'a Spelling>,
+    /// Whether cycles are followed on beyond their first change, where they are unstable, to the end of the axis.
+    pub unstable: bool,
+    /// A quantity that the map has, and the value that it has on curves of [`Kind::Condition`].
+    pub condition: Option<(Measure, f64)>,
+    /// Axes, and values at which the points of curves are located.
+    pub through: &'a [(usize, f64)],
     /// Values of the axes at which curves are searched: along both axes, from the cycle there. None searches between the map's cells.
     pub from: Option<[f64; 2]>,
     /// Largest number of curves.
@@ -237,9 +302,14 @@ pub struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// Whether curves of a kind are searched.
+    fn wants(&self, kind: Kind) -> bool {
+        self.kinds.is_empty() || self.kinds.contains(&kind)
+    }
+
     /// Whether all curves between cells are searched. Otherwise the share of pairs with a curve says nothing.
     fn is_whole(&self) -> bool {
-        self.kinds.is_empty() && self.word.is_none() && self.from.is_none()
+        self.kinds.is_empty() && self.word.is_none() && self.from.is_none() && !self.unstable
     }
 }
 
@@ -264,8 +334,20 @@ struct Course {
     start: State,
     axis: usize,
     end: f64,
-    /// First, least and largest step, relative to the course.
-    steps: [f64; 3],
+    reach: Reach,
+}
+
+/// How far a branch is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reach {
+    /// To its first change, or to the other cell.
+    Cell,
+    /// To its first change, or to the end of the axis.
+    Axis,
+    /// Through all changes to the end of the axis.
+    Whole,
+    /// To the value of the condition, or to the other cell.
+    Condition,
 }
 
 /// What the cycle of one cell meets on its way to the other one.
@@ -295,7 +377,17 @@ struct Finder<'a> {
     lines: Vec<Vec<[f64; 2]>>,
 }
 
-/// Finds the bifurcation curves of a finished map over two parameters. `progress` gets the number of pairs that are done, and of all.
+/// What watches a search.
+pub struct Watch<'a> {
+    /// Gets the number of pairs of cells that are done, and of all.
+    pub progress: &'a dyn Fn(usize, usize),
+    /// Gets what is found so far.
+    pub found: &'a dyn Fn(&Curves),
+    /// Ends the search.
+    pub halt: &'a AtomicBool,
+}
+
+/// Finds the bifurcation curves of a finished map over two parameters. `known`: what an interrupted search has found.
 ///
 /// # Panics
 /// If the axes of the scene are not two parameters.
@@ -304,8 +396,8 @@ pub fn curves(
     plan: &Plan,
     records: &dyn Records,
     search: &Search<'_>,
-    progress: &dyn Fn(usize, usize),
-    halt: &AtomicBool,
+    known: Curves,
+    watch: &Watch<'_>,
 ) -> Curves {
     let axes = scene.axes();
     let of = |i: usize| {
@@ -318,13 +410,16 @@ pub fn curves(
         records,
         search,
         parameters: [of(0), of(1)],
-        halt,
+        halt: watch.halt,
         crossed: HashSet::new(),
         followed: HashMap::new(),
-        found: Curves::default(),
-        lines: Vec::new(),
+        lines: known.curves.iter().map(Curve::line).collect(),
+        found: known,
     };
-    finder.run(progress);
+    let lines = std::mem::take(&mut finder.lines);
+    lines.iter().for_each(|line| finder.cross(line));
+    finder.lines = lines;
+    finder.run(watch);
     finder.found
 }
 
@@ -353,40 +448,43 @@ impl Finder<'_> {
             || (j + 1 < rows && is_like(run + columns))
     }
 
+    /// Returns all pairs of neighbouring runs from the same start.
+    fn neighbours(&self) -> Vec<Pair> {
+        let [columns, rows] = self.plan.counts();
+        let of = |cell: usize| {
+            let [i, j] = self.plan.indices(cell as u32);
+            let right = (i + 1 < columns).then_some(Pair { cells: [cell, cell + 1], axis: 0 });
+            let above = (j + 1 < rows).then_some(Pair { cells: [cell, cell + columns], axis: 1 });
+            right.into_iter().chain(above)
+        };
+        (0..self.records.count()).flat_map(of).collect()
+    }
+
     /// Returns all pairs of neighbours with different motions, of which at least one is a short cycle.
     fn pairs(&self) -> Vec<Pair> {
-        let [columns, rows] = self.plan.counts();
-        let mut pairs = Vec::new();
-        for cell in 0..self.records.count() {
-            let (class, record) = self.class(cell);
-            let [i, j] = self.plan.indices(cell as u32);
-            let right = (i + 1 < columns).then_some((cell + 1, 0));
-            let above = (j + 1 < rows).then_some((cell + columns, 1));
-            for (other, axis) in right.into_iter().chain(above) {
-                let (next, other_record) = self.class(other);
-                let differ = class != next
-                    || (record.word_hash, record.symmetric)
-                        != (other_record.word_hash, other_record.symmetric);
-                // A cycle in one cell alone, amid other motion, shows no region.
-                let is_region = |cell: usize, class: Class| self.is_short(class) && self.has_like(cell);
-                if differ
-                    && ((self.is_short(class) && self.is_short(next))
-                        || is_region(cell, class)
-                        || is_region(other, next))
-                {
-                    pairs.push(Pair { cells: [cell, other], axis });
-                }
-            }
-        }
+        let mut pairs = self.neighbours();
+        pairs.retain(|pair| {
+            let [cell, other] = pair.cells;
+            let ((class, record), (next, there)) = (self.class(cell), self.class(other));
+            let differ =
+                class != next || (record.word_hash, record.symmetric) != (there.word_hash, there.symmetric);
+            // A cycle in one cell alone, amid other motion, shows no region.
+            let is_region = |cell: usize, class: Class| self.is_short(class) && self.has_like(cell);
+            differ
+                && ((self.is_short(class) && self.is_short(next))
+                    || is_region(cell, class)
+                    || is_region(other, next))
+        });
         pairs
     }
 
-    fn run(&mut self, progress: &dyn Fn(usize, usize)) {
+    fn run(&mut self, watch: &Watch<'_>) {
         if let Some(values) = self.search.from {
-            self.run_from(values, progress);
+            self.run_from(values, watch.progress);
             return;
         }
-        let mut pairs = self.pairs();
+        let only_condition = self.search.kinds == [Kind::Condition];
+        let mut pairs = if only_condition { Vec::new() } else { self.pairs() };
         let count = pairs.len();
         Random::new(1).draw(&mut pairs, count);
         // Pairs of two cycles say more about curves than the borders of chaos.
@@ -396,13 +494,20 @@ impl Finder<'_> {
             if self.halt.load(Ordering::Relaxed) {
                 break;
             }
-            progress(nth * BATCH, count);
+            (watch.progress)(nth * BATCH, count);
             let open: Vec<Pair> = batch.iter().copied().filter(|pair| !self.is_crossed(pair)).collect();
-            let ways: Vec<[Way; 2]> =
-                open.par_iter().map(|pair| [false, true].map(|side| self.way(pair, side, false))).collect();
+            let ways: Vec<[Way; 2]> = open
+                .par_iter()
+                .map(|pair| [false, true].map(|side| self.way(pair, side, Reach::Cell)))
+                .collect();
             let continuing = self.continuing(&open, &ways);
+            let reach = if self.search.unstable { Reach::Whole } else { Reach::Axis };
             let beyond: Vec<Way> =
-                continuing.par_iter().map(|(pair, side)| self.way(pair, *side, true)).collect();
+                continuing.par_iter().map(|(pair, side)| self.way(pair, *side, reach)).collect();
+            // What was cut short says nothing.
+            if self.halt.load(Ordering::Relaxed) {
+                break;
+            }
             let mut seeds = Vec::new();
             for ((pair, side), way) in continuing.iter().zip(beyond) {
                 let Way::Meets(met) = way else { continue };
@@ -417,11 +522,66 @@ impl Finder<'_> {
                 undecided.push((*pair, ways));
             }
             self.trace(seeds);
+            (watch.found)(&self.found);
         }
-        progress(count, count);
+        (watch.progress)(count, count);
         if self.search.is_whole() {
             self.tally(&pairs, undecided);
         }
+        self.run_condition(watch);
+    }
+
+    /// Searches curves of the condition between neighbouring cells with the same cycle.
+    fn run_condition(&mut self, watch: &Watch<'_>) {
+        let Some((measure, value)) = self.search.condition else { return };
+        if !self.search.wants(Kind::Condition) {
+            return;
+        }
+        // Other curves may pass between cells with the same cycle.
+        self.crossed.clear();
+        let of = |cell: usize| measure.of(&self.class(cell).1).unwrap_or(f64::NAN) - value;
+        let is_same = |cell: usize, other: usize| {
+            let ((class, record), (next, there)) = (self.class(cell), self.class(other));
+            self.is_short(class)
+                && class == next
+                && (record.word_hash, record.symmetric) == (there.word_hash, there.symmetric)
+        };
+        let mut pairs = self.neighbours();
+        pairs.retain(|pair| {
+            let [cell, other] = pair.cells;
+            of(cell) * of(other) < 0.0 && is_same(cell, other)
+        });
+        let count = pairs.len();
+        Random::new(1).draw(&mut pairs, count);
+        for batch in pairs.chunks(SEEDS) {
+            let open: Vec<Pair> = batch.iter().copied().filter(|pair| !self.is_crossed(pair)).collect();
+            let ways: Vec<Way> =
+                open.par_iter().map(|pair| self.way(pair, false, Reach::Condition)).collect();
+            if self.halt.load(Ordering::Relaxed) {
+                break;
+            }
+            let mut seeds = Vec::new();
+            for (pair, way) in open.iter().zip(ways) {
+                let Way::Meets(met) = way else { continue };
+                seeds.extend(met.into_iter().map(|seed| self.met(seed, pair.cells[0], pair.axis)));
+            }
+            self.trace(seeds);
+            (watch.found)(&self.found);
+        }
+    }
+
+    /// Returns by how much a cycle differs from the condition.
+    fn off_condition(&self, model: &dyn Model, solution: &Solution, period: u32) -> f64 {
+        let of = || {
+            let (measure, value) = self.search.condition?;
+            let flow = Flow::of(model).ok()?;
+            let quantities = quantities_on(&flow, model.law(), solution.state(), period)?;
+            let quantities = Some(&quantities);
+            let cycle_time = (flow.timing == Timing::Cycle).then_some(flow.period);
+            let numbers = Measured { quantities, multiplier: None, cycle_time }.numbers();
+            Some(numbers[measure.place]? - value)
+        };
+        of().unwrap_or(f64::NAN)
     }
 
     /// Searches along both axes, in both directions, from the cycle at given values.
@@ -432,7 +592,8 @@ impl Finder<'_> {
         for (nth, (axis, rises)) in [(0, false), (0, true), (1, false), (1, true)].into_iter().enumerate() {
             progress(nth, 4);
             let end = if rises { axes[axis].max() } else { axes[axis].min() };
-            let course = Course { model: model.clone_model(), start, axis, end, steps: STEPS_BEYOND };
+            let reach = if self.search.unstable { Reach::Whole } else { Reach::Axis };
+            let course = Course { model: model.clone_model(), start, axis, end, reach };
             match self.follow(course, None) {
                 Way::Meets(met) => {
                     let of = |seed| Met { seed, model: model.clone_model(), axis };
@@ -459,21 +620,19 @@ impl Finder<'_> {
         self.crossed.contains(&(from, to))
     }
 
-    /// Follows the cycle of one cell of a pair to the other one; `beyond`: on to the end of the axis.
-    fn way(&self, pair: &Pair, swapped: bool, beyond: bool) -> Way {
+    /// Follows the cycle of one cell of a pair towards the other one.
+    fn way(&self, pair: &Pair, swapped: bool, reach: Reach) -> Way {
         let [from, to] = if swapped { [pair.cells[1], pair.cells[0]] } else { pair.cells };
         let (class, _) = self.class(from);
         let axis = &self.scene.axes()[pair.axis];
         let value = |cell: usize| axis.value(self.plan.indices(cell as u32)[pair.axis]);
-        let rises = value(to) > value(from);
-        let end = match (beyond, rises) {
-            (false, _) => value(to),
-            (true, false) => axis.min(),
-            (true, true) => axis.max(),
+        let end = match (reach, value(to) > value(from)) {
+            (Reach::Cell | Reach::Condition, _) => value(to),
+            (Reach::Axis | Reach::Whole, false) => axis.min(),
+            (Reach::Axis | Reach::Whole, true) => axis.max(),
         };
         let (model, start) = (self.plan.model(from as u32), self.plan.start(from as u32, self.records));
-        let steps = if beyond { STEPS_BEYOND } else { STEPS };
-        self.follow(Course { model, start, axis: pair.axis, end, steps }, Some(class))
+        self.follow(Course { model, start, axis: pair.axis, end, reach }, Some(class))
     }
 
     /// Follows the cycle at the start of a course, whose class may be known.
@@ -481,11 +640,14 @@ impl Finder<'_> {
         if known.is_some_and(|class| !self.is_short(class)) {
             return Way::Fails("no short cycle");
         }
-        let Course { mut model, start, axis, end, steps } = course;
+        let Course { mut model, start, axis, end, reach } = course;
         let parameter = self.parameters[axis].0;
         let value = model.value(parameter);
         let (range, rises) = ([value.min(end), value.max(end)], end > value);
-        let Ok(orbit) = analyse(&*model, start, &self.scene.orbit_settings()) else {
+        let settings = self.scene.orbit_settings();
+        let found =
+            analyse_until(&*model, start, &settings, LONGEST_WINDOW, EVENT_PERIODS, self.halt, &|_, _| ());
+        let Ok(Some(orbit)) = found else {
             return Way::Fails("the model has no motion");
         };
         if known.is_some_and(|class| class != orbit.class) {
@@ -495,7 +657,7 @@ impl Finder<'_> {
         if !self.is_short(orbit.class) {
             return Way::Fails("no short cycle");
         }
-        if self.search.word.is_some_and(|word| *word != orbit.word) {
+        if self.search.word.is_some_and(|word| *word != Spelling::new(&orbit.word)) {
             return Way::Fails("the cycle has another word");
         }
         if let Some(time) = orbit.cycle_time {
@@ -505,7 +667,17 @@ impl Finder<'_> {
         let Ok((itinerary, seed)) = Itinerary::of(&*model, &orbit.strobe, half_periods) else {
             return Way::Fails("the motion ends");
         };
-        let limits = BranchLimits { steps, points: MOST_POINTS, to_curve: true, halt: self.halt };
+        let condition = |model: &dyn Model, solution: &Solution| self.off_condition(model, solution, period);
+        let condition = [CycleFunction(&condition)];
+        let is_condition =
+            reach == Reach::Condition || self.search.from.is_some() && self.search.wants(Kind::Condition);
+        let limits = BranchLimits {
+            steps: if matches!(reach, Reach::Cell | Reach::Condition) { STEPS } else { STEPS_BEYOND },
+            points: if reach == Reach::Whole { self.search.most_points } else { MOST_POINTS },
+            to_curve: reach != Reach::Whole,
+            through: if is_condition { &condition } else { &[] },
+            ..BranchLimits::new(self.halt)
+        };
         let parts = match follow_on(&*model, &itinerary, &seed, parameter, (range, rises), &limits) {
             Ok(parts) => parts,
             Err(_) => return Way::Fails("the equations of the cycle have no solution"),
@@ -537,7 +709,9 @@ impl Finder<'_> {
                 let Class::Periodic { period } = class else { continue };
                 let key = (record.word_hash, period, pair.axis, side == 1);
                 let count = self.followed.entry(key).or_default();
-                if matches!(way, Way::Continues) && *count < BEYOND_BASINS {
+                let goes_on =
+                    matches!(way, Way::Continues) || self.search.unstable && matches!(way, Way::Meets(_));
+                if goes_on && *count < BEYOND_BASINS {
                     *count += 1;
                     all.push((*pair, side == 1));
                 }
@@ -551,7 +725,7 @@ impl Finder<'_> {
         let mut open: Vec<(Kind, Met)> = seeds
             .into_iter()
             .filter_map(|met| Some((Kind::of(&met.seed)?, met)))
-            .filter(|(kind, ..)| self.search.kinds.is_empty() || self.search.kinds.contains(kind))
+            .filter(|(kind, ..)| self.search.wants(*kind))
             .collect();
         while !open.is_empty()
             && self.found.curves.len() < self.search.most_curves
@@ -572,15 +746,29 @@ impl Finder<'_> {
                     open.push(seed);
                 }
             }
-            let limits = BranchLimits {
-                steps: [1e-3, 1e-9, LARGEST_STEP],
-                points: self.search.most_points,
-                to_curve: false,
-                halt: self.halt,
-            };
             let traced: Vec<_> = open
                 .par_iter()
                 .map(|(_, Met { seed, model, axis })| {
+                    let condition = |model: &dyn Model, solution: &Solution| {
+                        self.off_condition(model, solution, seed.period())
+                    };
+                    let of_axis = |&(axis, value): &(usize, f64)| {
+                        move |_: &dyn Model, solution: &Solution| {
+                            let values = solution.values();
+                            values[values.len() - 2 + axis] - value
+                        }
+                    };
+                    let of_axes: Vec<_> = self.search.through.iter().map(of_axis).collect();
+                    let through: Vec<CycleFunction<'_>> =
+                        of_axes.iter().map(|test| CycleFunction(test)).collect();
+                    let limits = BranchLimits {
+                        steps: [1e-3, 1e-9, LARGEST_STEP],
+                        points: self.search.most_points,
+                        to_curve: false,
+                        through: &through,
+                        value: Some(CycleFunction(&condition)),
+                        halt: self.halt,
+                    };
                     let arm = |forward: bool| {
                         let parameter = self.parameters[*axis].0;
                         curve(&**model, seed, parameter, (self.parameters, forward), &limits)
@@ -600,6 +788,7 @@ impl Finder<'_> {
                         self.found.failures.push((*kind, place, "the curve has no second point".to_owned()));
                     }
                     Ok(arms) => self.add(*kind, &met.seed, &arms),
+                    Err(CycleError::Halted) => {}
                     Err(error) => self.found.failures.push((*kind, place, error.to_string())),
                 }
             }
@@ -659,7 +848,7 @@ impl Finder<'_> {
                 for special in &part.special {
                     self.found.meetings.push(Meeting {
                         curve: number,
-                        with: Kind::meeting(special),
+                        with: With::of(special),
                         at: of(&special.at),
                     });
                 }
@@ -672,7 +861,7 @@ impl Finder<'_> {
             }
             points.extend(found);
         }
-        let ends = arms.each_ref().map(|arm| arm.last().map_or("", reason));
+        let ends = arms.each_ref().map(|arm| arm.last().map_or("", reason).to_owned());
         let (word, period) = (seed.word.clone(), seed.period());
         let curve = Curve { kind, word, period, points, ends };
         let line = curve.line();
@@ -765,14 +954,15 @@ fn curve_point(point: &BranchPoint, (ranges, sign): ([[f64; 2]; 2], f64), arclen
 fn reason(part: &Branch) -> &'static str {
     match &part.end {
         BranchEnd::Range => "border of the map",
-        BranchEnd::Border => match part.special.last().and_then(Kind::meeting) {
-            Some(Kind::Grazing) => "another wall is touched",
-            Some(Kind::MeshingGrazing) => "a contact touches its wall",
-            Some(Kind::MeshingBorder) => "another contact begins or ends",
-            Some(Kind::Sticking) => "sticking begins or ends",
+        BranchEnd::Border => match part.special.last().map(With::of) {
+            Some(With::Kind(Kind::Grazing)) => "another wall is touched",
+            Some(With::Kind(Kind::MeshingGrazing)) => "a contact touches its wall",
+            Some(With::Kind(Kind::MeshingBorder)) => "another contact begins or ends",
+            Some(With::Kind(Kind::Sticking)) => "sticking begins or ends",
             _ => "the sequence of flights changes",
         },
         BranchEnd::Failed(CycleError::Diverges) => "Newton's method fails at the shortest step",
+        BranchEnd::Failed(CycleError::Halted) => "interrupted",
         BranchEnd::Failed(_) => "the model has no motion beyond",
         BranchEnd::Closed => "closed",
         BranchEnd::TurnsBack => "turns back",

@@ -1,7 +1,9 @@
 //! Words and patterns in records: up to 64 symbols, or 42 with letters of gaps, or 40 with letters after `c`, or else hash and length.
 
+use std::str::FromStr;
+
 use super::{Record, WORD_SYMBOLS, valid};
-use rattlemap_dynamics::word::Word;
+use rattlemap_dynamics::word::{Word, WordError};
 
 /// How the symbols of a word are packed into numbers.
 pub(crate) struct SymbolCode {
@@ -57,6 +59,20 @@ pub enum Spelling {
         /// Number of symbols.
         length: u32,
     },
+}
+
+impl FromStr for Spelling {
+    type Err = WordError;
+
+    /// Reads a word, or `w#hash/length` from a table.
+    fn from_str(text: &str) -> Result<Spelling, WordError> {
+        let hashed = || {
+            let (hash, length) = text.strip_prefix("w#")?.split_once('/')?;
+            let hash = u64::from_str_radix(hash, 16).ok()?;
+            Some(Spelling::Hashed { hash, length: length.parse().ok()? })
+        };
+        hashed().map_or_else(|| text.parse().map(|word| Spelling::new(&word)), Ok)
+    }
 }
 
 impl Spelling {

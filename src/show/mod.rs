@@ -21,6 +21,7 @@ pub mod orbit_spectrum;
 pub mod orbit_summary;
 pub mod parameters;
 pub mod provenance;
+pub mod refined_cycle;
 pub mod refinement;
 pub mod replay;
 pub mod report;

@@ -7,7 +7,7 @@ use crate::show::instant::Instant;
 use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::parameters::{self, Parameters};
-use rattlemap_dynamics::cycle::Cycle;
+use crate::show::refined_cycle::Refined;
 use rattlemap_dynamics::model::{Model, State};
 use rattlemap_dynamics::orbit::{Event, History, Orbit, SlipPoint};
 
@@ -17,7 +17,7 @@ pub fn to_json(
     model: &dyn Model,
     orbit: &Orbit,
     instant: Option<Instant>,
-    refined: Option<&Cycle>,
+    refined: Option<&Refined>,
 ) -> String {
     let mut properties = json!({
         "class": orbit.class.name(),
@@ -36,15 +36,8 @@ pub fn to_json(
         "strobe": components(model, &orbit.strobe),
         "events": events(model, &orbit.events, &orbit.slips),
     });
-    if let Some(cycle) = refined {
-        properties["refined"] = json!({
-            "period": cycle.periods,
-            "word": cycle.word.time_order(),
-            "stable": cycle.is_stable(),
-            "floquet": cycle.multipliers,
-            "strobe": components(model, &cycle.solution.state()),
-            "event_times": cycle.event_times(),
-        });
+    if let Some(refined) = refined {
+        properties["refined"] = refined.object(model);
     }
     object(model, properties, instant)
 }
@@ -67,7 +60,7 @@ pub fn history_to_json(
     object(model, properties, instant)
 }
 
-fn components(model: &dyn Model, state: &State) -> Vec<f64> {
+pub(super) fn components(model: &dyn Model, state: &State) -> Vec<f64> {
     state[..model.state_names().len()].to_vec()
 }
 

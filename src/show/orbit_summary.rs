@@ -9,7 +9,6 @@ use crate::show::names;
 use crate::show::orbit_quantities;
 use crate::show::run_up::{Ramp, RunUp};
 use crate::show::symbols::with_unit;
-use rattlemap_dynamics::cycle::Cycle;
 use rattlemap_dynamics::model::{Model, Parameter, State, Timing};
 use rattlemap_dynamics::number::significant;
 use rattlemap_dynamics::orbit::{Class, Event, EventKind, History, Orbit, SlipPoint, Status};
@@ -50,25 +49,6 @@ pub fn summary(model: &dyn Model, orbit: &Orbit, instant: Option<Instant>) -> St
         meshing => events(model, &orbit.events, &orbit.slips, meshing.is_some() || orbit.mesh_fraction > 0.0),
     });
     text
-}
-
-/// Describes a cycle that solves its equations.
-pub fn cycle_summary(model: &dyn Model, cycle: &Cycle) -> String {
-    let kind = if cycle.is_stable() { "stable" } else { "unstable" };
-    let word = if cycle.word.is_empty() { "no events".to_owned() } else { cycle.word.time_order() };
-    let multipliers: Vec<String> = cycle.multipliers.iter().copied().map(complex).collect();
-    let times: Vec<String> = cycle.event_times().iter().map(|turns| format!("{turns:?}")).collect();
-    let names = model.state_names().into_iter().zip(cycle.solution.state());
-    let strobe: Vec<String> = names.map(|(name, value)| format!("{name}={value:?}")).collect();
-    let facts = [
-        ("refined cycle", format!("period {}, {kind}", cycle.periods)),
-        ("word, in time", word),
-        ("Floquet multipliers", multipliers.join(", ") + &without_shifts(model)),
-        ("strobe", strobe.join(" ")),
-        ("events at t / T", times.join(" ")),
-    ];
-    let lines = facts.iter().map(|(label, value)| format!("{label:<21} {value}\n"));
-    ["\n".to_owned()].into_iter().chain(lines).collect()
 }
 
 /// Returns a summary of a motion from the start: its first state, its last one and its events. Periods are numbered from 1.
@@ -136,7 +116,7 @@ pub fn timing(model: &dyn Model) -> Timing {
 }
 
 /// Names the multipliers that a list leaves out.
-fn without_shifts(model: &dyn Model) -> String {
+pub(super) fn without_shifts(model: &dyn Model) -> String {
     let in_place = model.oscillator().is_ok_and(|oscillator| !oscillator.rigid_modes().modes.is_empty());
     let shifts = [(in_place, "in place"), (timing(model) == Timing::Cycle, "in time")];
     let left_out: Vec<&str> = shifts.into_iter().filter_map(|(is_so, what)| is_so.then_some(what)).collect();
@@ -266,7 +246,7 @@ fn exponent(orbit: &Orbit) -> String {
     }
 }
 
-fn complex([re, im]: [f64; 2]) -> String {
+pub(super) fn complex([re, im]: [f64; 2]) -> String {
     let [sign, size] = if im < 0.0 { ["-", &significant(-im)] } else { ["+", &significant(im)] };
     if im == 0.0 { significant(re) } else { format!("{}{sign}{size}i", significant(re)) }
 }

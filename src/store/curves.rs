@@ -1,6 +1,7 @@
 //! The folder of the curves of a map: tables, figure and manifest.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
@@ -22,14 +23,39 @@ use crate::store::map::REPORT;
 const CURVES: &str = "curves.csv";
 const POINTS: &str = "curve_points.csv";
 const UNEXPLAINED: &str = "unexplained.csv";
+/// What a search has found that is not finished.
+const SEARCH: &str = "search.json";
 /// Names of the figure, by format.
 static FIGURES: LazyLock<[(Format, String); 3]> = LazyLock::new(|| names::figures("curves"));
 
 /// Names of all files that the command may write.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    [MANIFEST, CURVES, POINTS, UNEXPLAINED, REPORT]
+    [MANIFEST, CURVES, POINTS, UNEXPLAINED, SEARCH, REPORT]
         .into_iter()
         .chain(FIGURES.iter().map(|(_, name)| name.as_str()))
+}
+
+/// Stores what a search has found so far. `of`: what is searched, and in which map.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save(folder: &Folder, of: &Value, found: &Curves) -> Result<(), OutputError> {
+    folder.replace(SEARCH, |out| Ok(serde_json::to_writer(out, &json!({ "search": of, "found": found }))?))
+}
+
+/// Removes what a finished search has stored.
+///
+/// # Errors
+/// If the file cannot be removed.
+pub fn forget(folder: &Folder) -> Result<(), OutputError> {
+    folder.remove(&[SEARCH])
+}
+
+/// Returns what an interrupted search has found; none if the folder has no such search.
+pub fn saved(folder: &Path, of: &Value) -> Option<Curves> {
+    let mut saved: Value = serde_json::from_slice(&std::fs::read(folder.join(SEARCH)).ok()?).ok()?;
+    let is_same = saved["search"] == *of;
+    is_same.then(|| serde_json::from_value(saved["found"].take()).ok())?
 }
 
 /// Writes the tables, the figure in these formats, the page with these data, and the manifest last. Returns the names of the files.
@@ -44,7 +70,8 @@ pub fn write(
     elapsed: Duration,
 ) -> Result<Vec<&'static str>, OutputError> {
     let clock = Instant::now();
-    inventory::clear_for(folder, names())?;
+    // An interrupted search keeps what it has stored.
+    inventory::clear_for(folder, names().filter(|name| *name != SEARCH))?;
     let scene = cells.scene();
     let axes = [0, 1].map(|i| &*scene.axes()[i].parameter().name);
     let states = scene.base().state_names();
@@ -64,7 +91,7 @@ pub fn write(
     for curve in &found.curves {
         *kinds.entry(curve.kind.name()).or_insert(0) += 1;
     }
-    let ends: Vec<_> = found.curves.iter().map(|curve| curve.ends).collect();
+    let ends: Vec<_> = found.curves.iter().map(|curve| &curve.ends).collect();
     let failures: Vec<_> = found
         .failures
         .iter()

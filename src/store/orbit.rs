@@ -16,13 +16,13 @@ use crate::show::names;
 use crate::show::orbit_json::to_json;
 use crate::show::orbit_spectrum::{Spectrum, samples_per_period};
 use crate::show::parameters::Parameters;
+use crate::show::refined_cycle::Refined;
 use crate::show::run_up::{RunUp, Series};
 use crate::show::table::orbit_tables::{self, Moment};
 use crate::store::error::OutputError;
 use crate::store::folder::Folder;
 use crate::store::inventory;
 use crate::store::manifest::{self, Head, MANIFEST, joined};
-use rattlemap_dynamics::cycle::Cycle;
 use rattlemap_dynamics::model::{Model, ModelError, State};
 use rattlemap_dynamics::motion::Flow;
 use rattlemap_dynamics::orbit::{Class, History, Orbit, Settings, Stopped, history, trace};
@@ -49,7 +49,7 @@ pub struct OrbitRequest {
     /// State at a requested time.
     pub instant: Option<Instant>,
     /// The cycle that solves its equations, if one is requested.
-    pub refined: Option<Cycle>,
+    pub refined: Option<Refined>,
 }
 
 /// Files of the figures of the motion.

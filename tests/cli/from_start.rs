@@ -210,11 +210,20 @@ fn an_unstable_cycle_in_chaos_is_refined() {
     for (a, b) in start.iter().zip(numbers(&after["end"])) {
         assert!((a - b).abs() < 1e-10, "{start:?}: {after}");
     }
+    // The motion is printed all the same.
     run(&folder, &format!("{chaos} --refine"))
         .failure()
-        .stderr(says(&["--period N asks for an unstable cycle"]));
+        .stdout(says(&["chaotic"]))
+        .stderr(says(&["a period or a word asks for an unstable cycle"]));
     run(&folder, "orbit --model belt-oscillator --refine --period 2")
         .failure()
         .stderr(says(&["only a model with a force has cycles of a given period"]));
+    let object = printed(&folder, "orbit --set e=0.4 --refine --by e --json");
+    let found = &object["refined"]["derivatives"];
+    // The mean of a cycle that is its own mirror image is 0 at every e.
+    assert!(found["quantities"]["mean_gap"].as_f64().unwrap().abs() < 1e-9, "{found}");
+    assert!(found["quantities"]["impact_speed"].as_f64().unwrap() < -1.0, "{found}");
+    assert_eq!(found["reasons"], serde_json::json!({}));
+    run(&folder, "orbit --refine --by q").code(2).stderr(says(&["unknown parameter `q`"]));
     run(&folder, &format!("{chaos} --refine --word 138")).code(2).stderr(says(&["`138` is no word"]));
 }

@@ -1,15 +1,16 @@
 //! Cycles as boundary value problems: derivatives by parameters, and branches with their special points.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
 
 use crate::common::built_in;
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::cycle::{
-    Branch, BranchEnd, BranchLimits, Itinerary, Solution, Special, follow_on, switch,
+    Branch, BranchEnd, BranchLimits, Cycle, Itinerary, Solution, Special, follow_on, switch,
 };
 use rattlemap_dynamics::model::{Model, REST};
-use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse};
+use rattlemap_dynamics::motion::Flow;
+use rattlemap_dynamics::orbit::{Class, Orbit, Settings, analyse, quantities_on};
 use rattlemap_dynamics::stability::multipliers;
 
 /// Returns a periodic motion from rest with its period, and the model with its time.
@@ -163,4 +164,54 @@ fn the_cycles_that_leave_a_pitchfork_are_followed_to_their_graze() {
         let (kind, at) = special[0];
         assert!(kind == Special::Grazing && (at - 0.60521).abs() < 5e-6, "{special:?}");
     }
+}
+
+/// A ball on a shaking table with g = omega = 1 that bounces once in a period hits it with the speed 2 pi / (1 + e), at the time t at which
+/// the table's speed -A sin t is pi (1 - e) / (1 + e). The product of its multipliers is e^2.
+#[test]
+fn derivatives_of_a_bouncing_ball_are_those_of_its_closed_form() {
+    let (e, a) = (0.5, 1.2);
+    let model = built_in("shaking-table", &[("e", e), ("A", a)]);
+    let (u, mut near) = (PI * (1.0 - e) / (1.0 + e), REST);
+    let since = (u / a).asin();
+    near[0] = a * (since.cos() - 1.0) + PI * since - 0.5 * since * since;
+    near[1] = PI - since;
+    let cycle = Cycle::near(&model, &near, 1).unwrap();
+    let speed = |model: &dyn Model, cycle: &Cycle| {
+        let flow = Flow::of(model).unwrap();
+        let found = quantities_on(&flow, model.law(), cycle.solution.state(), 1);
+        vec![found.map(|found| found.approaches[2].largest)]
+    };
+    let by = |name: &str| cycle.derivatives(&model, model.index(name).unwrap(), (&speed, &[0])).unwrap();
+    let (by_e, by_a) = (by("e"), by("A"));
+    let close = |x: f64, y: f64| assert!((x - y).abs() < 1e-8, "{x}, {y}");
+    close(by_e.numbers[0].unwrap().unwrap(), -2.0 * PI / (1.0 + e).powi(2));
+    close(by_a.numbers[0].unwrap().unwrap(), 0.0);
+    let t = 2.0 * PI * cycle.event_times()[0];
+    close(2.0 * PI * by_a.event_times[0], u / (a * a * t.cos()));
+    let complex = |pair: [f64; 2]| nalgebra::Complex::new(pair[0], pair[1]);
+    let values: Vec<_> = cycle.multipliers.iter().map(|&pair| complex(pair)).collect();
+    let slopes: Vec<_> = by_e.multipliers.iter().map(|pair| complex(pair.map(Result::unwrap))).collect();
+    close((values[0] * slopes[1] + values[1] * slopes[0]).re, 2.0 * e);
+}
+
+/// The impacts of a gear on both flanks are equally fast without a load. With a load, those on one of them are faster.
+#[test]
+fn a_tie_of_two_maxima_has_no_derivative() {
+    let model = built_in("drag-gear", &[]);
+    let orbit = analyse(&model, REST, &Settings::default()).unwrap();
+    let Class::Periodic { period } = orbit.class else { panic!("{:?}", orbit.class) };
+    let cycle = Cycle::near(&model, &orbit.strobe, period).unwrap();
+    let largest = |model: &dyn Model, cycle: &Cycle| {
+        let flow = Flow::of(model).unwrap();
+        let found = quantities_on(&flow, model.law(), cycle.solution.state(), cycle.periods);
+        vec![found.map(|found| found.approaches[2].largest)]
+    };
+    let slope = |name: &str| {
+        let found = cycle.derivatives(&model, model.index(name).unwrap(), (&largest, &[0])).unwrap();
+        found.numbers[0].unwrap()
+    };
+    let [below, above] = slope("T").unwrap_err().sides;
+    assert!((below + above).abs() < 1e-3 * above && above > 0.1, "{below}, {above}");
+    assert!(slope("e").is_ok());
 }

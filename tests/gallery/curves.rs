@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::built_in;
 use rattlemap::job::{self, Processor};
-use rattlemap::map::curves::{Curve, Curves, Kind, Search, curves};
+use rattlemap::map::curves::{Curve, Curves, Kind, Search, Watch, With, curves};
 use rattlemap::map::scene::{Quantity, Scene, Start};
-use rattlemap::model_file::FileModel;
+use rattlemap::model_file::{FileModel, subjects};
+use rattlemap::record::measures;
 use rattlemap_dynamics::model::{Model, REST};
 
 /// Finds the curves of a small map.
@@ -26,12 +27,30 @@ fn found_of(
         .axis(x, left..=right, 20)
         .axis(y, low..=high, 20)
         .start(start)
-        .quantities(&[Quantity::Class, Quantity::Word])
+        .quantities(&[Quantity::Class, Quantity::Word, Quantity::ImpactSpeedMax])
         .build()
         .unwrap();
-    let map = job::run(&scene, Processor::Cpu).unwrap();
-    let search = Search { longest, kinds: &[], word: None, from: None, most_curves: 100, most_points: 1000 };
-    curves(&scene, map.plan(), map.records(), &search, &|_, _| (), &AtomicBool::new(false))
+    found_in(&scene, &Search { longest, ..SEARCH })
+}
+
+/// Finds everything.
+const SEARCH: Search<'_> = Search {
+    longest: 1,
+    kinds: &[],
+    word: None,
+    unstable: false,
+    condition: None,
+    through: &[],
+    from: None,
+    most_curves: 100,
+    most_points: 1000,
+};
+
+/// Computes the map of a scene, and finds its curves.
+fn found_in(scene: &Scene, search: &Search<'_>) -> Curves {
+    let map = job::run(scene, Processor::Cpu).unwrap();
+    let watch = Watch { progress: &|_, _| (), found: &|_| (), halt: &AtomicBool::new(false) };
+    curves(scene, map.plan(), map.records(), search, Curves::default(), &watch)
 }
 
 /// Returns the curves of a kind and period whose cycles have one event in each cycle, or none.
@@ -133,4 +152,57 @@ fn contact_of_a_bouncing_ball_lasts_between_its_limits() {
             assert!(error < 1e-9, "{parameter}: {error}");
         }
     }
+}
+
+/// The ball of the tests above hits the table with the speed 2 pi / (1 + e), whatever the amplitude is.
+#[test]
+fn impacts_of_a_bouncing_ball_have_a_given_speed_on_a_line() {
+    let (mut thrown, speed) = (REST, 4.2);
+    thrown[1] = 3.0;
+    let scene = Scene::builder(built_in("shaking-table", &[]))
+        .axis("e", 0.4..=0.6, 12)
+        .axis("A", 1.1..=1.4, 12)
+        .start(Start::State(thrown))
+        .quantities(&[Quantity::Class, Quantity::Word, Quantity::ImpactSpeedMax])
+        .build()
+        .unwrap();
+    let names = subjects(scene.base());
+    let measure = measures::all().find(|measure| measure.name(&names) == "impact_speed_max").unwrap();
+    let search = Search {
+        condition: Some((measure, speed)),
+        kinds: &[Kind::Condition],
+        through: &[(1, 1.25)],
+        ..SEARCH
+    };
+    let found = found_in(&scene, &search);
+    let lines = of(&found, Kind::Condition, 1);
+    assert!(!lines.is_empty(), "{:?}", found.failures);
+    for point in lines.iter().flat_map(|line| &line.points) {
+        assert!((point.values[0] - (2.0 * PI / speed - 1.0)).abs() < 1e-9, "{point:?}");
+    }
+    let at: Vec<f64> = found
+        .meetings
+        .iter()
+        .filter(|meeting| meeting.with == With::Value && found.curves[meeting.curve - 1].word.len() == 1)
+        .map(|meeting| meeting.at.values[1])
+        .collect();
+    assert!(!at.is_empty() && at.iter().all(|value| (value - 1.25).abs() < 1e-9), "{at:?}");
+}
+
+/// Beyond its folds and flips, an oscillator that touches a stiffer spring has unstable cycles that graze.
+#[test]
+fn curves_of_unstable_cycles_are_found_on_request() {
+    let scene = Scene::builder(built_in("bilinear", &[]))
+        .axis("omega", 0.5..=2.0, 10)
+        .axis("zeta", 0.01..=0.1, 10)
+        .quantities(&[Quantity::Class, Quantity::Word])
+        .build()
+        .unwrap();
+    let count = |unstable: bool| {
+        let found = found_in(&scene, &Search { longest: 4, unstable, ..SEARCH });
+        let of_kind = |kind: Kind| found.curves.iter().filter(|curve| curve.kind == kind).count();
+        [Kind::Fold, Kind::Grazing].map(of_kind)
+    };
+    let (stable, all) = (count(false), count(true));
+    assert!(all[0] >= stable[0] && all[1] > stable[1], "{stable:?}, {all:?}");
 }

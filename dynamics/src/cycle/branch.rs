@@ -1,5 +1,6 @@
 //! Branches of cycles over one parameter, through folds, by pseudo-arclength continuation (Keller 1977).
 
+use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, DVector, RowDVector};
@@ -33,6 +34,12 @@ const ROUGH_BORDER: f64 = 1e-5;
 /// Largest distance of a graze from the last point before it, relative to the parameter's range, beyond that of the first point behind it.
 const BESIDE_TOUCH: f64 = 1e-4;
 
+/// Value of a function at a change of its sign, relative to its values beside it, above which it jumps.
+const JUMPS: f64 = 1e-3;
+
+/// Largest value of a function that is 0, relative to its change over the scales of the unknowns.
+const HAS_VALUE: f64 = 1e-10;
+
 /// Largest number of points in a row at which a search finds no cycle.
 const MOST_FAILURES: u32 = 4;
 
@@ -56,6 +63,16 @@ const BEYOND: [f64; 6] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Step that shows in which direction events become faster.
 const SHORT_STEP: f64 = 1e-6;
 
+/// A smooth function of a cycle: of its model, and of its states and times.
+#[derive(Clone, Copy)]
+pub struct CycleFunction<'a>(pub &'a (dyn Fn(&dyn Model, &Solution) -> f64 + Sync));
+
+impl fmt::Debug for CycleFunction<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("CycleFunction")
+    }
+}
+
 /// Limits of a branch. Lengths are relative to the scales of the unknowns, in which the parameter's range has the length 1.
 #[derive(Clone, Copy, Debug)]
 pub struct BranchLimits<'h> {
@@ -65,6 +82,10 @@ pub struct BranchLimits<'h> {
     pub points: usize,
     /// Whether the branch ends at its first special point that a curve crosses. It is located roughly: the curve's equations are exact.
     pub to_curve: bool,
+    /// Points at which one of these is 0 are special.
+    pub through: &'h [CycleFunction<'h>],
+    /// What is 0 on a curve of [`Condition::Value`].
+    pub value: Option<CycleFunction<'h>>,
     /// The branch ends when this is raised.
     pub halt: &'h AtomicBool,
 }
@@ -72,7 +93,14 @@ pub struct BranchLimits<'h> {
 impl<'h> BranchLimits<'h> {
     /// Returns limits for branches over the whole range of a parameter.
     pub fn new(halt: &'h AtomicBool) -> BranchLimits<'h> {
-        BranchLimits { steps: [1e-3, 1e-9, 2e-2], points: 2000, to_curve: false, halt }
+        BranchLimits {
+            steps: [1e-3, 1e-9, 2e-2],
+            points: 2000,
+            to_curve: false,
+            through: &[],
+            value: None,
+            halt,
+        }
     }
 }
 
@@ -108,6 +136,8 @@ pub enum Special {
     Grazing,
     /// The sequence of flights changes in another way.
     Border,
+    /// A given function is 0.
+    Value,
 }
 
 /// A special point of a branch.
@@ -178,6 +208,10 @@ pub(super) struct Along<'a> {
     pub(super) condition: Option<Condition>,
     /// Accuracy of special points, relative to the scales of the unknowns.
     accuracy: f64,
+    /// What is 0 on a curve of [`Condition::Value`].
+    pub(super) value: Option<CycleFunction<'a>>,
+    /// All searches end when this is raised.
+    pub(super) halt: &'a AtomicBool,
 }
 
 /// Follows the branch of a cycle over a parameter within a range, in one direction: towards larger values at first if `rises`.
@@ -194,7 +228,7 @@ pub fn follow(
 ) -> Result<Branch, CycleError> {
     let mut start = itinerary.solve(model, from)?;
     start.values = start.values.push(model.value(parameter));
-    let mut along = Along::new(model, itinerary, &start, &[(parameter, range)], None)?;
+    let mut along = Along::new(model, itinerary, &start, &[(parameter, range)], (None, limits))?;
     if limits.to_curve {
         along.accuracy = ROUGHLY_LOCATED;
     }
@@ -218,7 +252,7 @@ pub fn switch(
     limits: &BranchLimits<'_>,
 ) -> Result<Vec<Vec<Branch>>, CycleError> {
     let (itinerary, at, is_flip) = (&part.itinerary, &special.at, special.kind == Special::Flip);
-    let before = Along::new(model, itinerary, &at.solution, &[(parameter, range)], None)?;
+    let before = Along::new(model, itinerary, &at.solution, &[(parameter, range)], (None, limits))?;
     let (_, linearised) = before.point(at.solution.clone(), &at.tangent, 0.0, None)?;
     let size = at.solution.start.len();
     let sign = if is_flip { 1.0 } else { -1.0 };
@@ -236,7 +270,7 @@ pub fn switch(
         (doubled, start) = itinerary.doubled(&at.solution);
         of_events.extend(events.iter().map(|x| -x));
     }
-    let along = Along::new(model, &doubled, &start, &[(parameter, range)], None)?;
+    let along = Along::new(model, &doubled, &start, &[(parameter, range)], (None, limits))?;
     let mut ahead = DVector::zeros(along.scales.len());
     let entries = along_start.iter().chain(&of_events);
     ahead.iter_mut().zip(entries).zip(&along.scales).for_each(|((ahead, x), scale)| *ahead = x / scale);
@@ -283,7 +317,8 @@ fn go_on(
     while parts.len() < most
         && let Some(part) = parts.last()
         && let (BranchEnd::Border, Some(at)) = (&part.end, part.points.last())
-        && let Some((next, seed, side)) = successor(model, &part.itinerary, at, parameter, range)
+        && let Some((next, seed, side)) =
+            successor(model, &part.itinerary, at, parameter, (range, limits.halt))
     {
         let is_known = |part: &Branch| {
             let first = &part.points[0];
@@ -337,7 +372,7 @@ fn successor(
     itinerary: &Itinerary,
     at: &BranchPoint,
     parameter: usize,
-    range: [f64; 2],
+    (range, halt): ([f64; 2], &AtomicBool),
 ) -> Option<(Itinerary, Solution, f64)> {
     let (values, own_count) = (&at.solution.values, at.solution.values.len() - 1);
     let mut seed = at.solution.clone();
@@ -347,6 +382,9 @@ fn successor(
     let differences =
         BEYOND.into_iter().flat_map(|share| [away, -away].map(|sign| sign * share * (range[1] - range[0])));
     for difference in differences {
+        if halt.load(Ordering::Relaxed) {
+            return None;
+        }
         let mut moved = placed(model, &free, &seed.values);
         moved.assign(parameter, at.value + difference);
         let Ok(oscillator) = moved.oscillator() else { continue };
@@ -426,7 +464,7 @@ impl<'a> Along<'a> {
         itinerary: &'a Itinerary,
         start: &Solution,
         parameters: &[(usize, [f64; 2])],
-        condition: Option<Condition>,
+        (condition, limits): (Option<Condition>, &BranchLimits<'a>),
     ) -> Result<Along<'a>, CycleError> {
         let mut free = own(model)?;
         free.extend(parameters.iter().map(|(index, _)| Free::Parameter(*index)));
@@ -437,8 +475,8 @@ impl<'a> Along<'a> {
         let ranges = parameters.iter().rev().map(|(_, [low, high])| high - low);
         scales.iter_mut().rev().zip(ranges).for_each(|(scale, range)| *scale = range);
         let accuracy = if condition.is_some() { LOCATED_ON_CURVE } else { LOCATED };
-        let parameters = parameters.to_vec();
-        Ok(Along { model, itinerary, free, scales, parameters, condition, accuracy })
+        let (parameters, value, halt) = (parameters.to_vec(), limits.value, limits.halt);
+        Ok(Along { model, itinerary, free, scales, parameters, condition, accuracy, value, halt })
     }
 
     /// Follows a branch from a point.
@@ -460,15 +498,19 @@ impl<'a> Along<'a> {
             let cosine = |next: &BranchPoint| now.0.tangent.dot(&next.tangent);
             let next = match self.next(&now, before.as_ref(), length) {
                 Ok((next, count))
-                    if (cosine(&next.0) >= BENT && count <= MOST_EASY_STEPS) || length <= least =>
+                    if (cosine(&next.0) >= BENT && count <= MOST_EASY_STEPS)
+                        || (length <= least && !self.is_of_value()) =>
                 {
                     let is_easy = cosine(&next.0) > STRAIGHT && count <= FEW_STEPS;
                     length = if is_easy { largest.min(1.5 * length) } else { length };
                     next
                 }
-                Err(error) if length <= least => {
+                // A curve of values has no direction at a kink.
+                failed if length <= least => {
+                    let error = failed.err().unwrap_or(CycleError::Diverges);
                     // The model may not allow values beyond the range.
-                    let is_at_end = matches!(error, CycleError::Model(_)) && self.is_beside_end(&now.0);
+                    let is_model = matches!(error, CycleError::Model(_)) || self.is_of_value();
+                    let is_at_end = is_model && self.is_beside_end(&now.0);
                     branch.end = if is_at_end { BranchEnd::Range } else { BranchEnd::Failed(error) };
                     break;
                 }
@@ -478,7 +520,9 @@ impl<'a> Along<'a> {
                 }
             };
             let border = self.border(&now, &next.0);
-            branch.special.extend(self.special(&now, border.as_ref().map_or(&next.0, |border| &border.at)));
+            let last = border.as_ref().map_or(&next.0, |border| &border.at);
+            branch.special.extend(self.special(&now, last));
+            branch.special.extend(limits.through.iter().filter_map(|test| self.passed(&now, last, *test)));
             if let Some(border) = border {
                 branch.points.push(border.at.clone());
                 branch.special.push(border);
@@ -632,6 +676,31 @@ impl<'a> Along<'a> {
         found
     }
 
+    /// Returns where a function is 0 between two points.
+    fn passed(
+        &self,
+        now: &(BranchPoint, Linearised),
+        next: &BranchPoint,
+        test: CycleFunction<'_>,
+    ) -> Option<SpecialPoint> {
+        let value = |point: &BranchPoint| (test.0)(&*self.model_at(point), &point.solution);
+        let (before, after) = (value(&now.0), value(next));
+        // A point of the branch where the function is exactly 0 belongs to the positive side.
+        let at = match (before == 0.0, after == 0.0) {
+            (true, _) if after < 0.0 => now.0.clone(),
+            (_, true) if before < 0.0 => next.clone(),
+            _ => self.locate(now, next, &value)?,
+        };
+        // A function that jumps has no zero there.
+        let is_zero = value(&at).abs() <= JUMPS * before.abs().max(after.abs());
+        (is_zero && self.end_of_range(&at).is_none()).then_some(SpecialPoint {
+            kind: Special::Value,
+            at,
+            meets: None,
+            touch: None,
+        })
+    }
+
     fn word(&self, solution: &Solution) -> Result<Word, CycleError> {
         self.itinerary.word(&*placed(self.model, &self.free, &solution.values), solution)
     }
@@ -669,11 +738,11 @@ impl<'a> Along<'a> {
             Some((laws, _)) => laws.beside(&*model)?,
             None => Laws::new(&*model, &self.free, Slopes::Fast)?,
         };
-        let linearised = self.itinerary.linearise(&laws, &solution)?;
+        let mut linearised = self.itinerary.linearise(&laws, &solution)?;
         let (count, nearby) = (before.len(), nearby.map_or(&[][..], |(_, extra)| extra));
         let row = RowDVector::from_fn(count, |_, j| before[j] / self.scales[j]);
-        let mut extra = self.conditions(&laws, &linearised, &solution, nearby)?;
-        extra.push((row, 0.0));
+        linearised.extra = self.conditions(&laws, &linearised, &solution, nearby)?;
+        let extra: Vec<Extra> = linearised.extra.iter().cloned().chain([(row, 0.0)]).collect();
         let (matrix, mut right) = linearised.with(&extra);
         right.fill(0.0);
         right[count - 1] = 1.0;
@@ -730,6 +799,9 @@ impl<'a> Along<'a> {
         predicted: Solution,
         length: f64,
     ) -> Result<((BranchPoint, Linearised), usize), CycleError> {
+        if self.halt.load(Ordering::Relaxed) {
+            return Err(CycleError::Halted);
+        }
         let centre = predicted.unknowns(self.itinerary);
         let row = RowDVector::from_fn(centre.len(), |_, j| from.tangent[j] / self.scales[j]);
         let extra = |laws: &Laws, linearised: &Linearised, at: &Solution, nearby: &[Extra]| {
@@ -742,8 +814,26 @@ impl<'a> Along<'a> {
         let (solution, length) = (found.solution, from.arclength + length);
         let next = self.point(solution, &from.tangent, length, Some(&found.nearby))?;
         // Where multipliers grow without limit, a matrix may be almost singular in another way.
-        let is_critical = self.condition.is_none_or(|condition| condition.is_met(&next.0.multipliers));
+        let is_critical = self.condition.is_none_or(|condition| condition.is_met(&next.0.multipliers))
+            && self.has_value(&next.1);
         if is_critical { Ok((next, found.steps)) } else { Err(CycleError::Diverges) }
+    }
+
+    /// Whether a curve of the values of a function is followed.
+    fn is_of_value(&self) -> bool {
+        self.condition == Some(Condition::Value)
+    }
+
+    /// Whether the given function is 0 on a curve of its values. Beyond a kink of the function, its gradient leads elsewhere.
+    fn has_value(&self, linearised: &Linearised) -> bool {
+        let equation = linearised.extra.last().filter(|_| self.is_of_value());
+        equation.is_none_or(|(gradient, value)| {
+            let slope = gradient
+                .iter()
+                .zip(&self.scales)
+                .fold(0.0, |most: f64, (x, scale)| most.max((x * scale).abs()));
+            value.abs() <= HAS_VALUE * slope
+        })
     }
 
     /// Whether the motion along the cycle has the cycle's sequence of flights.
@@ -761,7 +851,8 @@ impl<'a> Along<'a> {
     ) -> Option<BranchPoint> {
         let mut latest = (to.arclength - from.0.arclength, test(to), to.solution.clone());
         let mut other = (0.0, test(&from.0), from.0.solution.clone());
-        if latest.1 * other.1 >= 0.0 {
+        // A function that is not known has no sign.
+        if latest.1.is_nan() || other.1.is_nan() || latest.1 * other.1 >= 0.0 {
             return None;
         }
         let (mut found, mut share, mut failures) = (None, 0.5, 0);

@@ -3,6 +3,8 @@
 //! At folds and flips the matrix of a cycle's equations is singular. A border gives a smooth function that is 0 there, and its gradient
 //! (Govaerts 2000). Along a graze, the motion touches a wall without an event, so the equations stay regular.
 
+use std::sync::atomic::Ordering;
+
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::branch::{Along, nearest};
@@ -50,6 +52,8 @@ pub enum Condition {
     /// The motion touches a wall, or a force or a rate touches 0, without an event; or an impact is at the limit of those after which contact
     /// lasts.
     Touch,
+    /// The function [`BranchLimits::value`] is 0.
+    Value,
 }
 
 /// A cycle from which a curve is followed.
@@ -72,6 +76,7 @@ impl Seed {
             Special::Fold => (Condition::Fold, on_branch()),
             Special::Flip => (Condition::Flip, on_branch()),
             Special::Grazing | Special::Border => (Condition::Touch, special.touch.clone()?),
+            Special::Value => (Condition::Value, on_branch()),
             Special::Pitchfork => return None,
         };
         Some(Seed { condition, word: part.word.clone(), itinerary, solution })
@@ -126,7 +131,7 @@ pub fn curve(
     let mut start = seed.solution.clone();
     start.values = start.values.rows(0, own).into_owned().push(of(parameters[0])).push(of(parameters[1]));
     let other = usize::from(parameters[0].0 == parameter);
-    let along = Along::new(model, &seed.itinerary, &start, &parameters, Some(seed.condition))?;
+    let along = Along::new(model, &seed.itinerary, &start, &parameters, (Some(seed.condition), limits))?;
     let solve = |number: usize| {
         let direction = [0, 1].map(|i| if i == number { 1.0 } else { 0.0 });
         Ok((along.solve_across(&start, direction)?, number))
@@ -155,9 +160,10 @@ fn go_on(
     while parts.len() < MOST_PARTS
         && let Some(part) = parts.last()
         && let (BranchEnd::Border, Some(at)) = (&part.end, part.points.last())
-        && let Ok(along) = Along::new(model, &part.itinerary, &at.solution, &parameters, Some(condition))
+        && let Ok(along) =
+            Along::new(model, &part.itinerary, &at.solution, &parameters, (Some(condition), limits))
         && let Some((itinerary, solution, ahead)) = along.successor(at)
-        && let Ok(along) = Along::new(model, &itinerary, &solution, &parameters, Some(condition))
+        && let Ok(along) = Along::new(model, &itinerary, &solution, &parameters, (Some(condition), limits))
         && let Ok((mut first, linearised)) = along.point(solution, &along.towards(&ahead), 0.0, None)
     {
         let way: f64 = (0..2).map(|i| ahead[i] * first.tangent[first.tangent.len() - 2 + i]).sum();
@@ -183,7 +189,7 @@ impl Condition {
         match self {
             Condition::Fold => Some(1.0),
             Condition::Flip => Some(-1.0),
-            Condition::Touch => None,
+            Condition::Touch | Condition::Value => None,
         }
     }
 
@@ -207,8 +213,10 @@ impl Condition {
         at: &Solution,
         gradient: Option<&RowDVector<f64>>,
     ) -> Result<Vec<Extra>, CycleError> {
-        if self == Condition::Touch {
-            return Ok(linearised.touches.clone());
+        match self {
+            Condition::Touch => return Ok(linearised.touches.clone()),
+            Condition::Value => return Ok(along.value_equation(at, gradient).into_iter().collect()),
+            Condition::Fold | Condition::Flip => {}
         }
         // The time of a cycle without force is an unknown, too.
         let has_own = along.free.contains(&Free::CycleTime) && self == Condition::Fold;
@@ -272,6 +280,38 @@ fn singular(matrix: &DMatrix<f64>) -> Option<[DVector<f64>; 3]> {
 }
 
 impl Along<'_> {
+    /// Returns the given function, and its gradient by the state at phase 0 and the free numbers: the measured motion follows from these.
+    fn value_equation(&self, at: &Solution, gradient: Option<&RowDVector<f64>>) -> Option<Extra> {
+        let test = self.value?;
+        let value = |at: &Solution| (test.0)(&*placed(self.model, &self.free, &at.values), at);
+        let (size, count, here) = (at.start.len(), self.scales.len(), value(at));
+        let first = count - self.free.len();
+        let slope = |j: usize| {
+            if (size..first).contains(&j) {
+                return 0.0;
+            }
+            let h = DIFFERENCE * self.scales[j];
+            let moved = |h: f64| {
+                let mut moved = at.clone();
+                if j < size {
+                    moved.start[j] += h
+                } else {
+                    moved.values[j - first] += h
+                }
+                value(&moved)
+            };
+            // At an end of a parameter's range the model has no motion on one side.
+            let slopes = [h, -h].map(|h| (moved(h) - here) / h);
+            match slopes.map(f64::is_nan) {
+                [true, _] => slopes[1],
+                [_, true] => slopes[0],
+                _ => 0.5 * (slopes[0] + slopes[1]),
+            }
+        };
+        let gradient = gradient.cloned().unwrap_or_else(|| RowDVector::from_fn(count, |_, j| slope(j)));
+        Some((gradient, here))
+    }
+
     /// Solves all equations where the scaled parameters only change across a direction.
     fn solve_across(&self, at: &Solution, direction: [f64; 2]) -> Result<Solution, CycleError> {
         let (count, first) = (self.scales.len(), at.values.len() - 2);
@@ -313,6 +353,9 @@ impl Along<'_> {
         let linearised = self.itinerary.linearise(&laws, &at.solution).ok()?;
         let mut tried: Vec<Itinerary> = Vec::new();
         for length in BEYOND {
+            if self.halt.load(Ordering::Relaxed) {
+                return None;
+            }
             let step = DVector::from_fn(count, |j, _| at.tangent[j] * self.scales[j] * length);
             let mut seed = at.solution.clone();
             linearised.change(&mut seed, self.itinerary, &step);
@@ -330,8 +373,9 @@ impl Along<'_> {
                     continue;
                 }
                 tried.push(next.clone());
-                let Ok(beyond) = Along::new(self.model, &next, &start, &self.parameters, self.condition)
-                else {
+                let limits = BranchLimits { value: self.value, ..BranchLimits::new(self.halt) };
+                let kind = (self.condition, &limits);
+                let Ok(beyond) = Along::new(self.model, &next, &start, &self.parameters, kind) else {
                     continue;
                 };
                 if let Ok(solution) = beyond.solve_across(&start, ahead)

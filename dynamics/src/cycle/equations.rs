@@ -35,6 +35,8 @@ pub(super) struct Linearised {
     later: DMatrix<f64>,
     /// Times of all ends that are no events.
     known: Vec<f64>,
+    /// Further equations that are solved with these.
+    pub(super) extra: Vec<Extra>,
 }
 
 /// A state along a cycle, and the change of the state that makes all flights so far fit.
@@ -70,9 +72,7 @@ impl Carried {
     fn jump(&mut self, laws: &Laws, passage: &Passage) {
         let (system, n) = (&laws.system, self.state.len() / 2);
         let explicit: Vec<Velocities> = match system.jump(passage, 0, &self.state.as_slice()[n..]) {
-            Some(_) => (0..laws.free())
-                .map(|j| laws.slope(j, |system| changed(system, passage, &self.state)))
-                .collect(),
+            Some(_) => laws.slopes(|system| changed(system, passage, &self.state)).1,
             None => Vec::new(),
         };
         for nth in 0.. {
@@ -114,8 +114,8 @@ struct Function {
 
 impl Function {
     fn of(laws: &Laws, factors: impl Fn(&System) -> DVector<f64>) -> Function {
-        let by_free = (0..laws.free()).map(|j| laws.slope(j, &factors)).collect();
-        Function { factors: factors(&laws.system), by_free }
+        let (factors, by_free) = laws.slopes(factors);
+        Function { factors, by_free }
     }
 }
 
@@ -138,16 +138,15 @@ impl KnownLaws {
     ) -> (&Equations, &[Option<Equations>]) {
         let has_modes = |(other, ..): &(usize, _, _)| passages[*other].has_modes_of(&passages[place]);
         let at = self.flights.iter().position(has_modes).unwrap_or_else(|| {
-            let accelerations = |system: &System| system.accelerations(&passages[place]) * system.period();
-            let of_flight =
-                Equations { period: laws.system.period(), accelerations: accelerations(&laws.system) };
-            let by_free = |j: usize| {
-                let period = laws.slope(j, |system| system.period());
-                let slopes = Equations { period, accelerations: laws.slope(j, accelerations) };
-                let depends = period != 0.0 || slopes.accelerations.iter().any(|x| *x != 0.0);
-                depends.then_some(slopes)
+            let (accelerations, by_free) =
+                laws.slopes(|system| system.accelerations(&passages[place]) * system.period());
+            let (period, periods) = laws.slopes(|system| system.period());
+            let of_slopes = |(period, accelerations): (f64, DMatrix<f64>)| {
+                let depends = period != 0.0 || accelerations.iter().any(|x| *x != 0.0);
+                depends.then_some(Equations { period, accelerations })
             };
-            self.flights.push((place, of_flight, (0..laws.free()).map(by_free).collect()));
+            let by_free = periods.into_iter().zip(by_free).map(of_slopes).collect();
+            self.flights.push((place, Equations { period, accelerations }, by_free));
             self.flights.len() - 1
         });
         let (_, of_flight, by_parameter) = &self.flights[at];
@@ -222,6 +221,7 @@ impl Itinerary {
             turns: DMatrix::zeros(self.passages.len(), count),
             later: DMatrix::zeros(events, size),
             known: Vec::new(),
+            extra: Vec::new(),
         };
         let (mut equation, mut known, orders) = (size, KnownLaws::default(), system.orders());
         for (i, passage) in self.passages.iter().enumerate() {
@@ -247,9 +247,8 @@ impl Itinerary {
                 now.jump(laws, passage);
             } else {
                 flight.turns[1] = system.known_turns(passage);
-                (0..free).for_each(|j| {
-                    end_by[first_free + j] = laws.slope(j, |system| system.known_turns(passage))
-                });
+                let (_, slopes) = laws.slopes(|system| system.known_turns(passage));
+                end_by.rows_mut(first_free, free).copy_from_slice(&slopes);
             }
             let end = flight.end(&now.state).ok_or(CycleError::TooStiff)?;
             let turns = flight.turns[1];
@@ -312,9 +311,8 @@ fn limit(laws: &Laws, passage: &Passage, now: &Carried) -> Option<Extra> {
     let function = Function::of(laws, |system| of(system).map_or(&here.factors * 0.0, |of| of.factors));
     let (mut by, linear) = now.value(laws.system.orders(), &function);
     by += here.row.transpose() * now.by.rows(n, n) * here.slope;
-    for j in 0..laws.free() {
-        by[now.first_free + j] += laws.slope(j, |system| of(system).map_or(0.0, |of| of.value));
-    }
+    let (_, slopes) = laws.slopes(|system| of(system).map_or(0.0, |of| of.value));
+    slopes.iter().enumerate().for_each(|(j, slope)| by[now.first_free + j] += slope);
     Some((by, linear + here.value + here.slope * here.row.dot(&now.misfit.rows(n, n))))
 }
 
@@ -347,9 +345,8 @@ fn series_by(
         / (2.0 * DIFFERENCE);
     let mut by = now.by.tr_mul(&by_state);
     by.axpy(1.0 + by_turns, &now.turns_by, 1.0);
-    for j in 0..laws.free() {
-        by[now.first_free + j] += laws.slope(j, |system| duration(system, &now.state, turns));
-    }
+    let (_, slopes) = laws.slopes(|system| duration(system, &now.state, turns));
+    slopes.iter().enumerate().for_each(|(j, slope)| by[now.first_free + j] += slope);
     by
 }
 

@@ -88,15 +88,20 @@ impl Laws {
         self.stencil.nearby.len()
     }
 
-    /// Returns the derivative of a function of the laws by a free number. What does not depend on this number has the derivative 0 exactly.
-    pub(super) fn slope<T>(&self, free: usize, of: impl Fn(&System) -> T) -> T
+    /// Returns a function of the laws, and its derivatives by the free numbers. What does not depend on a number has the derivative 0 exactly.
+    pub(super) fn slopes<T>(&self, of: impl Fn(&System) -> T) -> (T, Vec<T>)
     where
         T: Clone + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
     {
-        let here = of(&self.stencil.centre);
-        let terms =
-            self.stencil.nearby[free].iter().map(|(weight, system)| (of(system) - here.clone()) * *weight);
-        terms.reduce(Add::add).expect("a stencil has places")
+        let here = of(&self.system);
+        let is_centre = Rc::ptr_eq(&self.system, &self.stencil.centre);
+        let centre = if is_centre { here.clone() } else { of(&self.stencil.centre) };
+        let slope = |nearby: &Vec<(f64, System)>| {
+            let terms = nearby.iter().map(|(weight, system)| (of(system) - centre.clone()) * *weight);
+            terms.reduce(Add::add).expect("a stencil has places")
+        };
+        let slopes = self.stencil.nearby.iter().map(slope).collect();
+        (here, slopes)
     }
 }
 
@@ -107,21 +112,12 @@ fn nearby(
     free: Free,
     slopes: Slopes,
 ) -> Result<Vec<(f64, System)>, ModelError> {
-    let (value, [least, most]) = match free {
+    let (value, range) = match free {
         Free::CycleTime => (system.period(), [0.0, f64::INFINITY]),
         Free::Parameter(index) => (model.value(index), model.parameters()[index].range.ends()),
     };
     let (step, side) = slopes.stencil();
-    let h = step * free.scale(model, value);
-    let reach = side as f64 * h;
-    let first = if value - reach < least {
-        0.0
-    } else if value + reach > most {
-        -2.0 * reach
-    } else {
-        -reach
-    };
-    let offsets: Vec<f64> = (0..=2 * side).map(|k| first + k as f64 * h).collect();
+    let offsets = stencil(value, range, (step * free.scale(model, value), side));
     let mut systems = Vec::new();
     for (k, offset) in offsets.iter().enumerate() {
         let weight = slope_at_zero(&offsets, k);
@@ -135,8 +131,21 @@ fn nearby(
     Ok(systems)
 }
 
+/// Returns the places of a stencil around a value: `side` steps of length `h` on either side, or twice as many on one side at an end of the range.
+pub(super) fn stencil(value: f64, [least, most]: [f64; 2], (h, side): (f64, usize)) -> Vec<f64> {
+    let reach = side as f64 * h;
+    let first = if value - reach < least {
+        0.0
+    } else if value + reach > most {
+        -2.0 * reach
+    } else {
+        -reach
+    };
+    (0..=2 * side).map(|k| first + k as f64 * h).collect()
+}
+
 /// Returns the derivative at 0 of the polynomial that is 1 at one place and 0 at the others.
-fn slope_at_zero(places: &[f64], one: usize) -> f64 {
+pub(super) fn slope_at_zero(places: &[f64], one: usize) -> f64 {
     let others = || (0..places.len()).filter(|&k| k != one);
     let term = |left_out: usize| {
         let factor = |k: usize| -places[k] / (places[one] - places[k]);

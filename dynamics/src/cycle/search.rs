@@ -41,24 +41,36 @@ impl Cycle {
     /// # Errors
     /// [`CycleError`] if Newton's method finds no cycle, or only one that the motion does not follow.
     pub fn near(model: &dyn Model, state: &State, periods: u32) -> Result<Cycle, CycleError> {
-        let (mut state, free) = (*state, own(model)?);
+        let mut state = *state;
         for _ in 0..MOST_SEQUENCES {
             let (itinerary, seed) = Itinerary::of(model, &state, 2 * periods)?;
             let solution = itinerary.solve(model, &seed)?;
-            let here = placed(model, &free, &solution.values);
-            if !itinerary.is_followed(&*here, &solution) {
-                state = solution.state();
-                continue;
+            state = solution.state();
+            if let Some(cycle) = Cycle::of(model, itinerary, solution, periods)? {
+                return Ok(cycle);
             }
-            let word = itinerary.word(model, &solution)?;
-            let mut multipliers =
-                multipliers(&itinerary.monodromy(model, &solution)?).ok_or(CycleError::Diverges)?;
-            if free.contains(&Free::CycleTime) {
-                nearest(&multipliers, 1.0).map(|place| multipliers.remove(place));
-            }
-            return Ok(Cycle { itinerary, solution, periods, word, multipliers });
         }
         Err(CycleError::Diverges)
+    }
+
+    /// Completes a solution to a cycle; none if the motion has other flights.
+    pub(super) fn of(
+        model: &dyn Model,
+        itinerary: Itinerary,
+        solution: Solution,
+        periods: u32,
+    ) -> Result<Option<Cycle>, CycleError> {
+        let free = own(model)?;
+        if !itinerary.is_followed(&*placed(model, &free, &solution.values), &solution) {
+            return Ok(None);
+        }
+        let word = itinerary.word(model, &solution)?;
+        let mut multipliers =
+            multipliers(&itinerary.monodromy(model, &solution)?).ok_or(CycleError::Diverges)?;
+        if free.contains(&Free::CycleTime) {
+            nearest(&multipliers, 1.0).map(|place| multipliers.remove(place));
+        }
+        Ok(Some(Cycle { itinerary, solution, periods, word, multipliers }))
     }
 
     /// Finds the cycle of this length, and of this word if it is given, that is nearest to a start. The search begins at the start and at states to which

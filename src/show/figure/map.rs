@@ -151,6 +151,7 @@ pub fn curve_color(kind: Kind) -> Color {
         Kind::MeshingBorder => [0x00, 0x8c, 0x95],
         Kind::ContactEnd => DARK,
         Kind::Sticking => [0x8a, 0x4b, 0x2a],
+        Kind::Condition => [0x1f, 0x4f, 0xd1],
     }
 }
 

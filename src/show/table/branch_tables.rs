@@ -17,6 +17,7 @@ fn name(kind: Special) -> &'static str {
         Special::Pitchfork => "pitchfork",
         Special::Grazing => "grazing",
         Special::Border => "border",
+        Special::Value => "value",
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use crate::map::curves::{CurvePoint, Curves, Kind};
+use crate::map::curves::{CurvePoint, Curves};
 use crate::record::Spelling;
 use crate::show::error::WriteError;
 use crate::show::names::float;
@@ -45,8 +45,7 @@ pub fn write_meetings(
     for meeting in &found.meetings {
         let kind =
             found.curves.get(meeting.curve - 1).map_or(String::new(), |curve| curve.kind.name().to_owned());
-        let with = meeting.with.map_or("border", Kind::name);
-        let head = [meeting.curve.to_string(), kind, with.to_owned()];
+        let head = [meeting.curve.to_string(), kind, meeting.with.name().to_owned()];
         let row = head.into_iter().chain(meeting.at.values.map(float));
         let row = row.chain(multiplier_values(&meeting.at, states));
         table.write_record(row.chain(state_values(&meeting.at, states)))?;
