@@ -402,20 +402,22 @@ impl Itinerary {
         (twice, both)
     }
 
-    /// Whether the cycle is a shorter one that is followed twice, or its own mirror image.
-    fn repeats(&self, model: &dyn Model, solution: &Solution) -> bool {
-        let (Ok(oscillator), Ok(scales)) = (model.oscillator(), self.scales(model, solution, &[])) else {
-            return false;
-        };
+    /// Returns the half of a cycle that is a shorter one followed twice, or its own mirror image; none of another cycle.
+    fn half(&self, model: &dyn Model, solution: &Solution) -> Option<(Itinerary, Solution)> {
+        let (oscillator, scales) = (model.oscillator().ok()?, self.scales(model, solution, &[]).ok()?);
         let system = System::new(&oscillator);
         let motion = MachineMotion::new(&system, &solution.state()).in_modes(&self.passages[0], None);
         let halves = self.half_periods(&system);
-        let Ok(half) = motion.passages(halves / 2) else { return false };
-        let Some(last) = half.last() else { return false };
-        let sign = if halves.is_multiple_of(4) { 1.0 } else { -1.0 };
-        let end = equations::jumped(&system, last, &in_blocks(&last.state, system.degrees()));
-        let apart = end * sign - &solution.start;
-        !self.mirrored && apart.iter().zip(&scales).all(|(x, scale)| x.abs() <= SAME * scale)
+        let passages = motion.passages(halves / 2).ok()?;
+        let ends: Vec<_> =
+            passages.iter().map(|passage| in_blocks(&passage.state, system.degrees())).collect();
+        let mirrored = !halves.is_multiple_of(4);
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        let apart = equations::jumped(&system, passages.last()?, ends.last()?) * sign - &solution.start;
+        let is_half = !self.mirrored && apart.iter().zip(&scales).all(|(x, scale)| x.abs() <= SAME * scale);
+        let turns = passages.iter().map(|passage| passage.turns).collect();
+        let half = Solution { start: solution.start.clone(), ends, turns, values: solution.values.clone() };
+        is_half.then_some((Itinerary { passages, mirrored }, half))
     }
 
     /// Returns the times at which the motion touches something without an event.

@@ -26,8 +26,8 @@ class Curves:
         One row per cycle on a curve: ``curve``, ``kind``, ``point``, the values of both axes, ``word``, ``period``, ``stable``, the
         multipliers, ``arclength`` and the state at phase 0.
     meetings
-        One row per point of a curve at which a second condition is met. Its kind is ``with``, or ``border`` if no kind fits, or
-        ``value`` at a value of ``through``.
+        One row per point at which two conditions are met: that of the curve, whose kind is ``kind``, and the one whose kind is
+        ``with``. ``with`` is ``border`` if none of the kinds fits, and ``value`` at a value of the argument ``through``.
     unexplained
         One row per pair of neighbouring cells with different cycles and no curve between them, with the reason. Borders of basins
         are left out.
@@ -78,7 +78,8 @@ def curves(
         Values of axes, such as ``{"omega": [5.5, 6.0]}``, at which points of curves are located. They are rows of ``meetings``
         with the kind ``value``.
     unstable
-        Whether cycles are followed on beyond their first change, where they are unstable, to the end of the axis.
+        Whether each cycle is also followed after it becomes unstable, up to the end of the axis. Curves that the unstable cycle
+        meets are followed, too.
     most_curves, most_points
         Largest number of curves, and of points of each part of a curve.
     progress
@@ -112,8 +113,10 @@ def curves(
             raise SceneError(f"{name} = {value}: it must be a whole number from {least} to {most}")
     with reporter(progress, "pairs of cells") as report:
         names = [kinds] if isinstance(kinds, str) else list(kinds)
-        if ("condition" in names) != (condition is not None) and (names or condition is None):
-            raise SceneError("kinds: the kind condition and the argument condition need each other")
+        if "condition" in names and condition is None:
+            raise SceneError("kinds: the kind condition needs the argument condition, such as ('impact_speed_max', 2.0)")
+        if condition is not None and names and "condition" not in names:
+            raise SceneError("condition: add 'condition' to kinds, or leave kinds empty")
         if at is not None and not at:
             raise SceneError("at: both axes need a value")
         value = None if condition is None else "=".join(map(str, condition))

@@ -265,17 +265,18 @@ class Orbit:
         Parameters
         ----------
         period, word
-            Length in forcing periods, 1 to 64, and word of another cycle: the nearest one to the start, stable or not. The length
-            is 1 by default if a word is given. Without both it is the cycle that the motion reaches.
+            Length of the cycle in forcing periods, from 1 to 64, and the order of its contacts. The cycle nearest to the start that
+            has both is found, stable or unstable. The length is 1 if only a word is given. Without both, the cycle that the motion
+            reaches is refined.
         by
-            Name of a parameter: adds the derivatives by it.
+            Name of a parameter. The derivatives of the cycle by this parameter are returned, too.
 
         Returns
         -------
         dict
             ``period``, ``word``, ``stable``, ``floquet`` (multipliers as pairs), ``strobe`` (state at phase 0) and ``event_times``
-            (in forcing periods), and with ``by`` also ``derivatives``: ``strobe``, ``event_times``, ``floquet``, ``quantities``,
-            and ``reasons`` for those that are None.
+            (in forcing periods). With ``by`` also ``derivatives``, a dict of ``strobe``, ``event_times``, ``floquet`` and
+            ``quantities``. Where a derivative does not exist it is None, and ``reasons`` says why.
 
         Raises
         ------
@@ -311,7 +312,8 @@ class Orbit:
         Returns
         -------
         float or numpy.ndarray
-            Units are those of the number per those of the parameter. At an end of the parameter's range it is one-sided.
+            The unit is that of the number, divided by that of the parameter. At an end of the parameter's range the derivative is
+            one-sided.
 
         Raises
         ------
@@ -330,7 +332,7 @@ class Orbit:
         found = self.refined(by=by)["derivatives"]
         key = "floquet" if of == "multipliers" else of
         if key not in ("strobe", "event_times", "floquet") and key not in found["quantities"]:
-            raise SceneError(f"{of}: the motion has strobe, event_times, multipliers, {', '.join(found['quantities'])}")
+            raise SceneError(f"{of}: unknown name. Use one of: strobe, event_times, multipliers, {', '.join(found['quantities'])}")
         if key in found["reasons"]:
             raise EngineError(f"{of} by {by}: {found['reasons'][key]}")
         if key == "floquet":

@@ -977,9 +977,9 @@ pub(crate) struct Compare {
     rattlemap curves scenes/e_omega.toml\n  \
     rattlemap curves out/e_omega --kind fold,flip --word 13554622")]
 pub(crate) struct Curves {
-    /// Folder of a finished map over two parameters, or a scene: its map is computed first, in out/<scene's name>, if it is not there
-    #[arg(value_name = "DIR|SCENE")]
-    pub(crate) map: PathBuf,
+    /// Folders of finished maps over two parameters, or scenes. The map of a scene is computed first, in out/<scene's name>, if it is not there
+    #[arg(value_name = "DIR|SCENE", required = true)]
+    pub(crate) maps: Vec<PathBuf>,
 
     /// Kinds of curves: fold, flip, pitchfork, grazing, meshing_grazing, meshing_border, contact_end, sticking, condition [default: all]
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = parse_kind)]
@@ -989,7 +989,7 @@ pub(crate) struct Curves {
     #[arg(long, value_name = "WORD")]
     pub(crate) word: Option<Spelling>,
 
-    /// Also follow each cycle beyond its first change, where it is unstable, to the end of the axis, and the curves that it meets there
+    /// Also follow each cycle after it becomes unstable, up to the end of the axis. Also follow the curves that the unstable cycle meets
     #[arg(long)]
     pub(crate) unstable: bool,
 
@@ -1018,7 +1018,7 @@ pub(crate) struct Curves {
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) most_points: u32,
 
-    /// Folder to write to [default: out/curves/<name of the map or scene>]
+    /// Folder to write to [default: out/curves/<name of the map or scene>]. With several maps, each has a folder of its name in this folder
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 

@@ -28,22 +28,36 @@ const SAVED: Duration = Duration::from_secs(5);
 /// Number of failures that a message lists; the manifest lists all.
 const LISTED: usize = 4;
 
-/// Reads the map, finds its curves, and writes them.
+/// Finds the curves of all maps, and writes them.
 pub(crate) fn run(arguments: &Curves) -> Result<(), Failure> {
     let wants = arguments.kind.is_empty() || arguments.kind.contains(&Kind::Condition);
     let needs = arguments.kind.contains(&Kind::Condition);
-    if needs && arguments.condition.is_none() || arguments.condition.is_some() && !wants {
-        let text = "the kind condition and the option --condition need each other";
+    if needs && arguments.condition.is_none() {
+        return Err(Failure::Usage(anyhow!("--kind condition needs --condition QUANTITY=VALUE")));
+    }
+    if arguments.condition.is_some() && !wants {
+        return Err(Failure::Usage(anyhow!("--condition: add condition to --kind, or leave out --kind")));
+    }
+    let folders: Vec<PathBuf> = arguments.maps.iter().map(|map| arguments.out(map)).collect();
+    if let Some(twice) = (1..folders.len()).find(|&i| folders[..i].contains(&folders[i])) {
+        let text = format!(
+            "two maps have the same name, so their curves need the same folder, {}",
+            folders[twice].display()
+        );
         return Err(Failure::Usage(anyhow!(text)));
     }
-    let out = arguments.out();
-    let map = if arguments.map.is_file() { make_map(arguments, &out)? } else { arguments.map.clone() };
+    arguments.maps.iter().zip(&folders).try_for_each(|(map, out)| run_one(arguments, map, out))
+}
+
+/// Reads a map, finds its curves, and writes them into a folder.
+fn run_one(arguments: &Curves, source: &Path, out: &Path) -> Result<(), Failure> {
+    let map = if source.is_file() { make_map(arguments, source, out)? } else { source.to_path_buf() };
     let clock = Instant::now();
     let interrupt = Interrupt::listen(arguments.quiet)?;
     let job = CurvesJob::open(&map, &Console::new(arguments.quiet, "", false))?;
     let of = arguments.search(job.scene());
-    let known = if arguments.resume { store::curves::saved(&out, &of) } else { None };
-    let folder = Folder::open(&out, arguments.force || known.is_some())?;
+    let known = if arguments.resume { store::curves::saved(out, &of) } else { None };
+    let folder = Folder::open(out, arguments.force || known.is_some())?;
     folder.prepare(store::curves::names())?;
     let through = read(&arguments.through, |text| CurvesJob::through(job.scene(), text))?.unwrap_or_default();
     let search = Search {
@@ -105,14 +119,14 @@ fn read<T>(text: &Option<String>, of: impl Fn(&str) -> Result<T, JobError>) -> R
 }
 
 /// Computes the map of a scene into its default folder, or completes it there. Returns the folder. `out`: the folder of the curves.
-fn make_map(arguments: &Curves, out: &Path) -> Result<PathBuf, Failure> {
-    let scene = SceneFile::map(&arguments.map).load(&[])?;
-    CurvesJob::require(&scene, &arguments.map)?;
+fn make_map(arguments: &Curves, source: &Path, out: &Path) -> Result<PathBuf, Failure> {
+    let scene = SceneFile::map(source).load(&[])?;
+    CurvesJob::require(&scene, source)?;
     read(&arguments.from, |text| CurvesJob::place(&scene, text))?;
     read(&arguments.through, |text| CurvesJob::through(&scene, text))?;
     read(&arguments.condition, |text| CurvesJob::condition(&scene, text))?;
     Folder::check(out, arguments.force || arguments.resume, store::curves::names())?;
-    let map = Map::of_scene(&arguments.map, arguments.quiet);
+    let map = Map::of_scene(source, arguments.quiet);
     super::map::run(&map)?;
     Ok(map.out())
 }
@@ -126,11 +140,14 @@ impl Curves {
         json!([scene.identity(), kinds, word, texts, self.unstable, self.longest, self.most_points])
     }
 
-    /// The folder to write to.
-    fn out(&self) -> PathBuf {
-        let name = if self.map.is_file() { self.map.file_stem() } else { self.map.file_name() };
-        let name = name.map(Path::new).unwrap_or(Path::new("map"));
-        self.out.clone().unwrap_or_else(|| Path::new("out/curves").join(name))
+    /// Returns the folder to which the curves of a map are written.
+    fn out(&self, map: &Path) -> PathBuf {
+        let name = if map.is_file() { map.file_stem() } else { map.file_name() };
+        let name = name.map_or(Path::new("map"), Path::new);
+        match &self.out {
+            Some(out) if self.maps.len() == 1 => out.clone(),
+            out => out.as_deref().unwrap_or(Path::new("out/curves")).join(name),
+        }
     }
 }
 

@@ -45,6 +45,9 @@ pub(crate) fn run(arguments: &Map) -> Result<(), Failure> {
     )?;
     let scene = file.load(&sets)?;
     let job = MapJob { scene: &scene, sets: &sets, engine, shard: *shard, resume: *resume };
+    if scene.sample().is_some() {
+        return super::shares::run(arguments, &job);
+    }
     let free = job.check(Some(&out))?;
     let plan = job.plan()?;
     let console = Arc::new(Console::new(quiet, plan.unit(), plan.refine().is_some()));

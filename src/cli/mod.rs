@@ -18,6 +18,7 @@ mod models;
 mod orbit;
 mod progress;
 pub(crate) mod say;
+mod shares;
 mod stdout;
 mod validate;
 

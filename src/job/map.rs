@@ -131,6 +131,10 @@ impl<'a> MapJob<'a> {
         folder: Option<&'p Folder>,
         observer: Arc<dyn Observer>,
     ) -> Result<OpenMap<'p>, JobError> {
+        if self.scene.sample().is_some() {
+            let text = "start.sample: shares of attractors are computed by `rattlemap map SCENE`, not by this command";
+            return Err(JobError::Usage(text.to_owned()));
+        }
         let clock = Instant::now();
         let request = self.engine_request(folder.map(Folder::path));
         let chosen = pollster::block_on(engine_choice::open(plan, &request))?;

@@ -8,14 +8,17 @@ use rattlemap_dynamics::model::{Model, State, Timing};
 use rattlemap_dynamics::orbit::{Class, Orbit};
 use rattlemap_dynamics::word::Word;
 
-/// Which cycle is requested, and by which parameter its derivatives are.
+/// Largest difference of the multiplier of a motion from that of its equations.
+const SAME_MULTIPLIER: f64 = 1e-3;
+
+/// Which cycle is requested, and the parameter of its derivatives.
 #[derive(Clone, Debug, Default)]
 pub struct RefineRequest {
-    /// Length of the cycle, in forcing periods. Without length and word it is the cycle that the motion reaches.
+    /// Length of the cycle, in forcing periods: 1 if only a word is given. Without both, the cycle that the motion reaches is refined.
     pub period: Option<u32>,
-    /// Word of the cycle; its length is 1 by default.
+    /// Word of the cycle; none allows any.
     pub word: Option<Word>,
-    /// Name of a parameter; no derivatives if none.
+    /// Name of the parameter; without it no derivatives are computed.
     pub by: Option<String>,
 }
 
@@ -23,11 +26,18 @@ pub struct RefineRequest {
 #[derive(Debug, thiserror::Error)]
 pub enum RefineError {
     /// The motion is no cycle.
-    #[error("the motion is not periodic; a period or a word asks for an unstable cycle")]
+    #[error(
+        "the motion is not periodic; give a period or a word to find the nearest cycle, stable or unstable"
+    )]
     NotPeriodic,
     /// Without a force, cycles have no common period.
     #[error("only a model with a force has cycles of a given period")]
     NoForce,
+    /// The equations contradict the motion.
+    #[error(
+        "the multipliers of the cycle are lost to rounding: it has series of impacts within series of impacts"
+    )]
+    Inaccurate,
     /// No cycle of this kind was found.
     #[error("no such cycle was found near the motion")]
     NotFound,
@@ -49,7 +59,13 @@ impl RefineRequest {
     ) -> Result<Option<Refined>, RefineError> {
         let cycle = if self.period.is_none() && self.word.is_none() {
             let Class::Periodic { period } = orbit.class else { return Err(RefineError::NotPeriodic) };
-            Cycle::near(model, &orbit.strobe, period)?
+            let cycle = Cycle::near(model, &orbit.strobe, period)?;
+            let largest = |all: &[[f64; 2]]| all.iter().map(|[re, im]| re.hypot(*im)).fold(0.0, f64::max);
+            let (own, other) = (orbit.floquet.as_deref().map(largest), largest(&cycle.multipliers));
+            if own.is_some_and(|own| (own - other).abs() > SAME_MULTIPLIER * (1.0 + own)) {
+                return Err(RefineError::Inaccurate);
+            }
+            cycle
         } else {
             if model.oscillator().map_err(CycleError::from)?.timing != Timing::Forced {
                 return Err(RefineError::NoForce);

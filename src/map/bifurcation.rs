@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use crate::map::scene::Start;
-use crate::record::measures::{MEASURES, Measured};
+use crate::record::measures::{self, MEASURES, Measured};
 use rattlemap_dynamics::model::{MOST_COORDINATES, Model, ModelError, Oscillator, REST, Side, State};
 use rattlemap_dynamics::named;
 use rattlemap_dynamics::orbit::{self, Class, EventKind, Orbit, Quantities, Settings, Status};
@@ -52,6 +52,12 @@ impl Column {
     /// Returns the pattern of a periodic orbit's word.
     pub fn pattern(&self) -> Option<Word> {
         self.word.as_ref().map(Word::pattern)
+    }
+
+    /// Returns the time of a cycle without a force; none of other motion.
+    pub fn cycle_time(&self) -> Option<f64> {
+        let measure = measures::all().find(|measure| measure.group.name == "cycle_time")?;
+        self.measures[measure.place]
     }
 }
 

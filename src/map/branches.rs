@@ -14,6 +14,12 @@ use rattlemap_dynamics::word::Word;
 /// Largest distance of a column's state from a branch that goes through it, relative to the largest state of the branch's part there.
 const ON_BRANCH: f64 = 0.02;
 
+/// Largest relative difference of the times of the same cycle without force.
+const SAME_TIME: f64 = 1e-3;
+
+/// Largest rounding error of a value, relative to it, and of a velocity at rest, relative to displacements.
+const ROUNDING: f64 = 1e-9;
+
 /// Longest cycles, in forcing periods, that are followed from flips, and largest number of branches from one cycle.
 const LONGEST: u32 = 16;
 const MOST_BRANCHES: usize = 64;
@@ -64,16 +70,17 @@ pub fn branches(
     for column in columns {
         let (Class::Periodic { period }, Some(state)) = (column.class, column.state) else { continue };
         let Some((_, model)) = cells.iter().find(|cell| cell.0 == column.value) else { continue };
+        let model = model.on_cycle(column.cycle_time());
         let parameter = model.index(name)?;
-        if all.pass_through(column.value, period, column.word.as_ref(), &state) {
+        if all.pass_through(column.value, period, (column.word.as_ref(), column.cycle_time()), &state) {
             continue;
         }
-        let Some(arms) = arms(&**model, &state, (period, parameter), range, halt) else { continue };
+        let Some(arms) = arms(&*model, &state, (period, parameter), range, halt) else { continue };
         // Branches, and those that leave them at flips and pitchforks.
         let mut found = vec![(period, arms)];
         while let Some((period, arms)) = found.pop() {
             count += 1;
-            all.add(count, &**model, (parameter, period), &arms)?;
+            all.add(count, &*model, (parameter, period), &arms)?;
             for part in arms.iter().flatten() {
                 for special in &part.special {
                     let periods = match special.kind {
@@ -85,11 +92,15 @@ pub fn branches(
                         continue;
                     }
                     let leaving =
-                        switch(&**model, part, special, parameter, range, &limits).unwrap_or_default();
+                        switch(&*model, part, special, parameter, range, &limits).unwrap_or_default();
                     let is_new = |arm: &Vec<Branch>| {
                         let first = &arm[0];
                         let middle = &first.points[first.points.len() / 2];
-                        !all.pass_through(middle.value, periods, Some(&first.word), &middle.solution.state())
+                        let name = (
+                            Some(&first.word),
+                            middle.solution.values().get(1).map(|_| middle.solution.values()[0]),
+                        );
+                        !all.pass_through(middle.value, periods, name, &middle.solution.state())
                     };
                     let mut arms = leaving.into_iter().filter(is_new);
                     let arms = [arms.next().unwrap_or_default(), arms.next().unwrap_or_default()];
@@ -119,16 +130,23 @@ fn arms(
 }
 
 impl Branches {
-    /// Whether a branch passes through a cycle.
-    fn pass_through(&self, value: f64, period: u32, word: Option<&Word>, state: &State) -> bool {
+    /// Whether a branch passes through a cycle with a word, and without force a time: then the state at phase 0 says nothing.
+    fn pass_through(
+        &self,
+        value: f64,
+        period: u32,
+        (word, time): (Option<&Word>, Option<f64>),
+        state: &State,
+    ) -> bool {
         self.rows.windows(2).any(|pair| {
             let [a, b] = [&pair[0], &pair[1]];
             let (Some(from), Some(to)) = (a.column.state, b.column.state) else { return false };
             let (low, high) = (a.column.value.min(b.column.value), a.column.value.max(b.column.value));
+            let slack = ROUNDING * value.abs();
             if a.branch != b.branch
                 || a.column.word.as_ref() != word
                 || a.column.class != (Class::Periodic { period })
-                || !(low..=high).contains(&value)
+                || !(low - slack..=high + slack).contains(&value)
             {
                 return false;
             }
@@ -137,7 +155,15 @@ impl Branches {
             let size = |first: usize| {
                 from.iter().chain(&to).skip(first).step_by(2).fold(0.0, |most: f64, x| most.max(x.abs()))
             };
-            let sizes = [size(0), size(1)];
+            if let Some(time) = time {
+                let [Some(first), Some(last)] = [a, b].map(|row| row.column.cycle_time()) else {
+                    return false;
+                };
+                return (first + share * (last - first) - time).abs() <= SAME_TIME * time;
+            }
+            let (displacement, velocity) = (size(0), size(1));
+            // At rest, velocities are rounding errors.
+            let sizes = [displacement, velocity.max(ROUNDING * displacement)];
             (0..state.len()).all(|i| {
                 let on = from[i] + share * (to[i] - from[i]);
                 (on - state[i]).abs() <= ON_BRANCH * sizes[i % 2]

@@ -101,6 +101,28 @@ impl Catalogue {
         all
     }
 
+    /// Identifies the motions of records as [`Catalogue::learn`] does. Records whose cycle Newton's method does not find get the nearest
+    /// one, or add their own motion as a cycle.
+    pub(crate) fn learn_all(
+        &mut self,
+        flow: &Flow,
+        law: Law,
+        count: usize,
+        record: impl Fn(usize) -> Record + Sync,
+    ) -> Vec<Outcome> {
+        let mut all = self.learn(flow, law, count, &record);
+        for (nth, found) in all.iter_mut().enumerate() {
+            if let Outcome::Unresolved(period) = *found {
+                let state = record(nth).strobe();
+                *found = Outcome::Cycle(match self.nearest(&state, period) {
+                    Some(known) => known,
+                    None => self.add(flow, StrobeCycle::through(flow, law, state, period)),
+                });
+            }
+        }
+        all
+    }
+
     /// Identifies the motion of a record from known cycles; the error is the period of an unknown cycle.
     fn identify(&self, record: &Record) -> Result<Outcome, u32> {
         match classify(record) {
@@ -207,17 +229,6 @@ pub(crate) fn learn(
     ids: &[usize],
 ) -> (Catalogue, Vec<Outcome>) {
     let mut catalogue = Catalogue::of(flow);
-    let mut all = catalogue.learn(flow, law, ids.len(), |nth| records.record(ids[nth]));
-    // Records without a cycle get the nearest one, or add their own motion as a cycle.
-    for (found, &id) in all.iter_mut().zip(ids) {
-        if let Outcome::Unresolved(period) = *found {
-            let state = records.record(id).strobe();
-            let known = catalogue.nearest(&state, period);
-            *found = Outcome::Cycle(match known {
-                Some(nth) => nth,
-                None => catalogue.add(flow, StrobeCycle::through(flow, law, state, period)),
-            });
-        }
-    }
+    let all = catalogue.learn_all(flow, law, ids.len(), |nth| records.record(ids[nth]));
     (catalogue, all)
 }

@@ -434,18 +434,21 @@ impl Finder<'_> {
         matches!(class, Class::Periodic { period } if period <= self.search.longest)
     }
 
-    /// Whether a neighbour has the same motion from the same start.
+    /// Whether a neighbouring cell has the same motion, from any start.
     fn has_like(&self, run: usize) -> bool {
         let ([columns, rows], [i, j]) = (self.plan.counts(), self.plan.indices(run as u32));
         let (class, record) = self.class(run);
+        let cell = run % self.plan.cell_count();
         let is_like = |other: usize| {
-            let (next, there) = self.class(other);
-            class == next && (record.word_hash, record.symmetric) == (there.word_hash, there.symmetric)
+            (other..self.records.count()).step_by(self.plan.cell_count()).any(|run| {
+                let (next, there) = self.class(run);
+                class == next && (record.word_hash, record.symmetric) == (there.word_hash, there.symmetric)
+            })
         };
-        (i > 0 && is_like(run - 1))
-            || (i + 1 < columns && is_like(run + 1))
-            || (j > 0 && is_like(run - columns))
-            || (j + 1 < rows && is_like(run + columns))
+        (i > 0 && is_like(cell - 1))
+            || (i + 1 < columns && is_like(cell + 1))
+            || (j > 0 && is_like(cell - columns))
+            || (j + 1 < rows && is_like(cell + columns))
     }
 
     /// Returns all pairs of neighbouring runs from the same start.

@@ -215,11 +215,12 @@ impl Engine<'_> {
     /// # Errors
     /// [`EngineError`], after which none of them is computed.
     pub async fn run(&mut self, cells: &[Cell]) -> Result<Vec<Record>, EngineError> {
-        let ids = || cells.iter().map(|cell| cell.id as usize);
-        let (Some(first), Some(last)) = (ids().min(), ids().max()) else { return Ok(Vec::new()) };
-        let mut places = vec![0; last - first + 1];
-        ids().enumerate().for_each(|(place, id)| places[id - first] = place);
-        let mut records = vec![Record::default(); cells.len()];
+        let mut ids: Vec<u32> = cells.iter().map(|cell| cell.id).collect();
+        ids.sort_unstable();
+        // A cell may occur twice in the list; both occurrences get the record of the last.
+        ids.dedup();
+        let place = |id: u32| ids.binary_search(&id).expect("engines return the cells that were begun");
+        let mut records = vec![Record::default(); ids.len()];
         let mut left = cells;
         loop {
             let (next, later) = left.split_at(left.len().min(self.room()));
@@ -229,9 +230,8 @@ impl Engine<'_> {
             if ended.is_empty() {
                 break;
             }
-            ended.into_iter().for_each(|(id, record)| records[places[id as usize - first]] = record);
+            ended.into_iter().for_each(|(id, record)| records[place(id)] = record);
         }
-        // A cell may occur twice in the list; both occurrences get the record of the last.
-        Ok(ids().map(|id| records[places[id - first]].clone()).collect())
+        Ok(cells.iter().map(|cell| records[place(cell.id)].clone()).collect())
     }
 }

@@ -12,6 +12,8 @@ pub mod scene;
 pub mod plan;
 pub mod schedule;
 pub mod shard;
+#[cfg(feature = "files")]
+pub mod shares;
 
 pub mod engine;
 pub mod sweep;

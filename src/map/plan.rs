@@ -157,8 +157,10 @@ impl Plan {
         assert!(u32::try_from(scene.run_count()).is_ok(), "cells are numbered by u32");
         let points = scene.points().clone();
         let mut needs = needs(&scene.outputs().quantities);
-        // A map of basins needs the exponent, because chaos is an attractor, too.
-        needs.exponent |= scene.is_basin();
+        // Maps of basins and of shares need the exponent, because chaos is an attractor, too.
+        needs.exponent |= scene.is_basin() || scene.sample().is_some();
+        // Attractors of a map of shares have their words as names.
+        needs.word |= scene.sample().is_some();
         // An adaptive map must not interpolate between motion with and without contact.
         let has_several_gaps = several_gaps(scene.base()).is_some();
         let has_gaps = has_several_gaps && (needs.impacts || needs.mesh);
@@ -335,8 +337,13 @@ impl Plan {
     /// Returns flow, law and start of the run `id`. The start of a run that follows its neighbour is rest here; the
     /// actual start depends on the neighbour's record ([`Plan::start`]).
     pub fn cell(&self, id: u32) -> Cell {
-        let law = self.laws.of(id as usize % self.cell_count());
-        Cell { id, flow: self.flow_of(id), law, start: self.own_start(id) }
+        let (flow, law) = self.parts(id);
+        Cell { id, flow, law, start: self.own_start(id) }
+    }
+
+    /// Returns flow and law of the run `id`.
+    pub(crate) fn parts(&self, id: u32) -> (u32, u32) {
+        (self.flow_of(id), self.laws.of(id as usize % self.cell_count()))
     }
 
     /// Returns the runs at these places of the order, as [`Plan::cell`] does.

@@ -30,12 +30,12 @@ pub(crate) use derived::Rule;
 pub use figure::{DiagramStyle, FigureStyle, MapLine, SECTION};
 pub(crate) use figure::{LayerScale, place};
 pub use keys::{KEYS, Key, KeyDefault, Takes};
-pub use limits::MAX_COUNT;
 pub(crate) use limits::MAX_PERIODS;
+pub use limits::{MAX_COUNT, REPLICATES};
 pub use list::{CompanionFile, FileText, FindFile, List};
 pub(crate) use points::Points;
 pub use settings::{Continuous, DEFAULT_AUDIT, Format, Integration, Outputs, Quantity, Refine, Steps};
-pub use start::{Draw, Start};
+pub use start::{Draw, Sample, Spread, Start};
 
 use crate::model_file::{FileModel, MODEL_FILE, subjects};
 use crate::text::document::{self, Node};
@@ -91,6 +91,7 @@ pub struct Scene {
     integration: Integration,
     start: Start,
     draw: Option<Draw>,
+    sample: Option<Sample>,
     refine: Option<Refine>,
     outputs: Outputs,
     figure: Figure,
@@ -204,6 +205,7 @@ impl Scene {
             integration: settings::read_integration(&root)?,
             start: start::read(&root, model, purpose)?,
             draw: start::read_draw(&root, purpose)?,
+            sample: start::read_sample(&root, points.base(), purpose)?,
             refine: settings::read_refine(&root, purpose)?,
             figure: figure::read(&root, &points, &outputs.quantities)?,
             outputs,
@@ -238,7 +240,12 @@ impl Scene {
         let [columns, rows] = self.points.counts();
         for cell in [0, columns - 1, columns * (rows - 1), columns * rows - 1] {
             let model = self.points.model(cell);
-            if let Err(error) = model.oscillator() {
+            let oscillator = model.oscillator();
+            if let (Ok(oscillator), Some(sample)) = (&oscillator, &self.sample) {
+                let section = root.section("start", &keys::names("start"))?;
+                start::check_box(&section, &sample.spread, oscillator, &self.points.named(cell))?;
+            }
+            if let Err(error) = oscillator {
                 let named = self.points.named(cell);
                 // If the value is derived, the error belongs to its expression.
                 let derives = match &error {
@@ -348,6 +355,11 @@ impl Scene {
     /// Returns the random starts of each cell; none if each cell has one start.
     pub fn draw(&self) -> Option<Draw> {
         self.draw
+    }
+
+    /// Returns the starts of a map of shares; none for other maps.
+    pub fn sample(&self) -> Option<&Sample> {
+        self.sample.as_ref()
     }
 
     /// Returns the settings of an adaptive map; none if every cell is integrated.

@@ -79,6 +79,20 @@ pub(crate) fn integration(scene: &Scene) -> String {
         Some(draw) => format!(", attractors counted with {} random states more", draw.count - 1),
         None => String::new(),
     };
+    let start = match scene.sample() {
+        Some(sample) => {
+            let (name, states) = sample.spread.parts();
+            let [first, second] = states.map(listed);
+            let most = if sample.width.is_some() { "at most " } else { "" };
+            match name {
+                "box" => format!("from {most}{} starts between ({first}) and ({second})", sample.count),
+                _ => {
+                    format!("from {most}{} normal starts, mean ({first}), deviation ({second})", sample.count)
+                }
+            }
+        }
+        None => start,
+    };
     let integration = scene.integration();
     let (transient, observed) = (integration.transient_periods, integration.observed_periods);
     let upper = if integration.early_stop { "at most " } else { "" };

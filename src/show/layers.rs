@@ -10,6 +10,8 @@ mod classes;
 pub(crate) mod colors;
 mod continuous;
 mod layer;
+#[cfg(feature = "files")]
+pub mod shares;
 mod words;
 
 pub use bar::Bar;

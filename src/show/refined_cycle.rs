@@ -1,5 +1,7 @@
 //! A cycle that solves its equations, and its derivatives by a parameter, as JSON and as text.
 
+use std::f64::consts::TAU;
+
 use serde_json::{Map, Value, json};
 
 use crate::map::branches::measured;
@@ -28,7 +30,7 @@ impl Refined {
     pub fn new(model: &dyn Model, cycle: Cycle, by: Option<&str>) -> Result<Refined, CycleError> {
         let quantities = [&[Quantity::Impacts, Quantity::Mesh][..], &Quantity::measured()].concat();
         let numbers = Number::of(model, &quantities);
-        let values = |model: &dyn Model, cycle: &Cycle| -> Vec<Option<f64>> {
+        let measure = |model: &dyn Model, cycle: &Cycle| -> Vec<Option<f64>> {
             let of_cycle = (cycle.periods, &cycle.word, cycle.solution.state(), &cycle.multipliers[..]);
             let column = measured(model, 0.0, of_cycle).ok();
             numbers.iter().map(|number| number.of_column(column.as_ref()?)).collect()
@@ -46,6 +48,16 @@ impl Refined {
                     numbers.iter().position(|other| is_like(number, other)).unwrap_or(i)
                 };
                 let kinds: Vec<usize> = numbers.iter().enumerate().map(kind).collect();
+                let here = measure(model, &cycle);
+                // Angles pass from pi to -pi.
+                let values = |model: &dyn Model, cycle: &Cycle| -> Vec<Option<f64>> {
+                    let nearest = |((value, here), number): ((Option<f64>, &Option<f64>), &Number)| {
+                        let turns = (value? - (*here)?) / TAU;
+                        let whole = if number.dimension == Dimension::Angle { turns.round() } else { 0.0 };
+                        Some(value? - TAU * whole)
+                    };
+                    measure(model, cycle).into_iter().zip(&here).zip(&numbers).map(nearest).collect()
+                };
                 let found = cycle.derivatives(
                     model,
                     model.index(name).map_err(ModelError::from)?,

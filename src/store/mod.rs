@@ -18,5 +18,6 @@ pub(crate) mod plain_file;
 pub mod record_file;
 pub mod run_records;
 pub mod shard;
+pub mod shares;
 pub mod unfinished;
 pub mod validation_json;

@@ -53,6 +53,13 @@ fn the_page_lists_the_columns_of_all_files() {
         let named: Vec<&str> = listed(name).into_iter().filter(|name| *name != "...").collect();
         assert_eq!(all.iter().filter(is_first).collect::<Vec<_>>(), named, "{name}");
     }
+    let sample = "[start]\nsample = 'box'\nlow = [-0.2, -1, 0, -1]\nhigh = [0.2, 1, 0, 1]\ncount = 8\n";
+    let energy = "[outputs]\nquantities = ['class', 'impact_energy']\nfiles = ['csv']\n";
+    fs::write(dir.join("likely.toml"), format!("{e}{omega}{sample}{energy}")).unwrap();
+    run(&folder, "map likely.toml --engine cpu --quiet").code(0);
+    for name in ["shares.csv", "share_cells.csv", "share_attractors.csv"] {
+        assert_eq!(header(&dir.join("out/likely").join(name)), listed(name), "{name}");
+    }
     // Maps of lanes have a further column (map/engines.rs).
     let listed_cells = listed("cells.csv and cells.npy").into_iter().filter(|name| *name != "finished");
     assert_eq!(header(&dir.join("out/plane/cells.csv")), listed_cells.collect::<Vec<_>>());

@@ -214,7 +214,7 @@ fn an_unstable_cycle_in_chaos_is_refined() {
     run(&folder, &format!("{chaos} --refine"))
         .failure()
         .stdout(says(&["chaotic"]))
-        .stderr(says(&["a period or a word asks for an unstable cycle"]));
+        .stderr(says(&["give a period or a word to find the nearest cycle"]));
     run(&folder, "orbit --model belt-oscillator --refine --period 2")
         .failure()
         .stderr(says(&["only a model with a force has cycles of a given period"]));

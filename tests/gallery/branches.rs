@@ -4,6 +4,9 @@ use std::f64::consts::{PI, TAU};
 use std::sync::atomic::AtomicBool;
 
 use crate::common::built_in;
+use rattlemap::map::bifurcation;
+use rattlemap::map::branches::branches;
+use rattlemap::map::scene::Start;
 use rattlemap::model_file::FileModel;
 use rattlemap_dynamics::cycle::{
     Branch, BranchEnd, BranchLimits, Cycle, Itinerary, Solution, Special, follow_on, switch,
@@ -214,4 +217,40 @@ fn a_tie_of_two_maxima_has_no_derivative() {
     let [below, above] = slope("T").unwrap_err().sides;
     assert!((below + above).abs() < 1e-3 * above && above > 0.1, "{below}, {above}");
     assert!(slope("e").is_ok());
+}
+
+/// Without damping and with constant sliding friction, a mass on a belt sticks and slides with the period
+/// 2 (fs - f0) / u + pi + 2 atan(u / (fs - f0)) (Galvanetto and Bishop 1999). Its branch is one line over the speed of the belt. If friction
+/// falls with the sliding rate up to w, steady sliding is unstable at belt speeds below w and stable beyond.
+#[test]
+fn branches_without_force_are_single_lines() {
+    let never = AtomicBool::new(false);
+    let of = |model: FileModel, speeds: &[f64]| {
+        let at = |&speed: &f64| {
+            let mut model = model.clone();
+            model.set("u", speed).unwrap();
+            (speed, Box::new(model) as Box<dyn Model>)
+        };
+        let cells: Vec<_> = speeds.iter().map(at).collect();
+        let columns = bifurcation::run_until(&cells, Start::Rest, &Settings::default(), &|_| (), &never)
+            .unwrap()
+            .unwrap();
+        branches(&cells, &columns, "u", &never).unwrap().rows
+    };
+    let rows = of(built_in("belt-oscillator", &[("fd", 0.8), ("r", 0.0)]), &[0.2, 0.35, 0.5, 0.7]);
+    let (low, high) = rows.iter().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), row| {
+        (low.min(row.column.value), high.max(row.column.value))
+    });
+    assert!(low < 0.201 && high > 0.699, "{low} {high}");
+    for row in &rows {
+        assert!(row.branch == 1 && row.stable, "{row:?}");
+        let (u, time) = (row.column.value, row.column.cycle_time().unwrap());
+        let closed = 2.0 * 0.2 / u + PI + 2.0 * f64::atan(u / 0.2);
+        assert!((time - closed).abs() < 1e-9 * closed, "{u}: {time} instead of {closed}");
+    }
+    let rows = of(built_in("belt-oscillator", &[]), &[0.5, 0.8, 1.45, 1.5]);
+    assert_eq!(rows.last().unwrap().branch, 2);
+    for row in rows.iter().filter(|row| row.branch == 2 && (row.column.value - 1.0).abs() > 1e-6) {
+        assert_eq!(row.stable, row.column.value > 1.0, "{row:?}");
+    }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::common::built_in;
 use rattlemap::job::{self, Processor};
-use rattlemap::map::curves::{Curve, Curves, Kind, Search, Watch, With, curves};
+use rattlemap::map::curves::{Curve, Curves, Kind, Meeting, Search, Watch, With, curves};
 use rattlemap::map::scene::{Quantity, Scene, Start};
 use rattlemap::model_file::{FileModel, subjects};
 use rattlemap::record::measures;
@@ -103,6 +103,74 @@ fn folds_and_grazes_of_an_impact_oscillator_lie_on_their_closed_forms() {
         ends.iter()
             .any(|curve| curve.points[0].values[0].min(curve.points.last().unwrap().values[0]) < 1.021)
     );
+}
+
+/// At the resonances omega = 2 n w / m of the oscillator above, with w^2 = 1 - z^2, the fold of a cycle with one impact in n periods touches
+/// the curve of grazing: their distance grows with the square of the distance from resonance. The factors follow from the closed form of
+/// the fold. At n = 2, m = 3 the orbit of the closed form passes through the wall, so there is no fold.
+#[test]
+fn folds_touch_grazing_at_resonance() {
+    let z: f64 = 0.05;
+    let grazing = |omega: f64| (1.0 - omega * omega).hypot(2.0 * z * omega);
+    let cases = [
+        (1, 2.0, 1.0, [0.995, 1.1], [0.05, 0.6], -18.68186),
+        (1, 1.0, -1.0, [1.9, 2.0], [2.0, 3.3], -101.84728),
+        (2, 2.0, 1.0, [1.99, 3.0], [0.5, 8.0], -560.35825),
+    ];
+    for (n, m, side, [left, right], [low, high], factor) in cases {
+        let resonance = 2.0 * f64::from(n) * f64::sqrt(1.0 - z * z) / m;
+        let through = [1.0, 2.0, 4.0].map(|k| (0, resonance + side * k * 0.002));
+        let scene = Scene::builder(built_in("coco-impact", &[]))
+            .axis("omega", left..=right, 20)
+            .axis("A", low..=high, 20)
+            .quantities(&[Quantity::Class, Quantity::Word])
+            .build()
+            .unwrap();
+        let found = found_in(&scene, &Search { longest: n, through: &through, ..SEARCH });
+        let at = |omega: f64| {
+            let is_there = |meeting: &&Meeting| {
+                let curve = &found.curves[meeting.curve - 1];
+                meeting.with == With::Value
+                    && (curve.kind, curve.period) == (Kind::Fold, n)
+                    && (meeting.at.values[0] - omega).abs() < 1e-9
+            };
+            let meeting =
+                found.meetings.iter().find(is_there).unwrap_or_else(|| panic!("n {n}, m {m}, {omega}"));
+            let [omega, amplitude] = meeting.at.values;
+            (amplitude - grazing(omega)) / (omega - resonance).powi(2)
+        };
+        // The limit, as a parabola through three values.
+        let [near, middle, far] = through.map(|(_, omega)| at(omega));
+        let limit = (8.0 * near - 6.0 * middle + far) / 3.0;
+        assert!((limit / factor - 1.0).abs() < 1e-3, "n {n}, m {m}: {limit} instead of {factor}");
+    }
+}
+
+/// The pitchfork at omega = 5.6 of the gear pair is met from cycles with the symmetry and from cycles without it, and both searches find the
+/// same curve (Fang et al. 2023: e = 0.5419).
+#[test]
+fn a_curve_is_the_same_from_wherever_it_begins() {
+    let scene = Scene::builder(built_in("gear-pair", &[]))
+        .axis("e", 0.4..=0.7, 4)
+        .axis("omega", 5.0..=6.5, 4)
+        .quantities(&[Quantity::Class, Quantity::Word])
+        .build()
+        .unwrap();
+    let through = [(1, 5.1), (1, 5.6), (1, 6.1)];
+    let at = |from: [f64; 2]| {
+        let search = Search { from: Some(from), kinds: &[Kind::Pitchfork], through: &through, ..SEARCH };
+        let found = found_in(&scene, &search);
+        through.map(|(_, omega)| {
+            let is_there = |meeting: &&Meeting| (meeting.at.values[1] - omega).abs() < 1e-9;
+            found.meetings.iter().find(is_there).unwrap_or_else(|| panic!("{from:?}, {omega}")).at.values[0]
+        })
+    };
+    let starts = [[0.5, 5.6], [0.55, 5.6], [0.59, 6.0]].map(at);
+    assert!((starts[0][1] - 0.541908).abs() < 1e-6, "{starts:?}");
+    for other in &starts[1..] {
+        let off = starts[0].iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-9 * 0.3, "{starts:?}");
+    }
 }
 
 /// A ball on a shaking table with g = omega = 1 (Holmes 1982; Luck and Mehta 1993): one bounce in n periods begins at the fold

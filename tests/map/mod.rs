@@ -14,6 +14,7 @@ mod basins;
 mod models;
 mod phase;
 mod runs;
+mod shares;
 mod starts;
 
 /// A map computed by a sweep, or the part before an error.

@@ -521,7 +521,7 @@ impl<'a> Along<'a> {
             };
             let border = self.border(&now, &next.0);
             let last = border.as_ref().map_or(&next.0, |border| &border.at);
-            branch.special.extend(self.special(&now, last));
+            branch.special.extend(self.special(&now, last, limits.to_curve));
             branch.special.extend(limits.through.iter().filter_map(|test| self.passed(&now, last, *test)));
             if let Some(border) = border {
                 branch.points.push(border.at.clone());
@@ -647,8 +647,13 @@ impl<'a> Along<'a> {
         })
     }
 
-    /// Returns folds, flips and pitchforks between two points.
-    fn special(&self, now: &(BranchPoint, Linearised), next: &BranchPoint) -> Vec<SpecialPoint> {
+    /// Returns folds, flips and pitchforks between two points. `with_parent`: also where the branch meets one of cycles half as long.
+    fn special(
+        &self,
+        now: &(BranchPoint, Linearised),
+        next: &BranchPoint,
+        with_parent: bool,
+    ) -> Vec<SpecialPoint> {
         let at_flip = AT_FLIP.max(1e3 * self.accuracy);
         let on_branch: [(Special, Test, f64); 3] = [
             (Special::Fold, fold, f64::INFINITY),
@@ -664,13 +669,19 @@ impl<'a> Along<'a> {
             // Products that are rounding errors belong to families of cycles.
             let is_clear = most.is_infinite() || test(&now.0).abs().min(test(next).abs()) > LEAST_PRODUCT;
             let at = is_clear.then(|| self.locate(now, next, &test)).flatten();
-            let is_there = |at: &BranchPoint| {
-                self.end_of_range(at).is_none()
-                    // There the branch only meets the one that it has left.
-                    && !(kind == Special::Fold && self.itinerary.repeats(&*self.model_at(at), &at.solution))
-                    && test(at).abs() <= most
+            let is_there = |at: &BranchPoint| self.end_of_range(at).is_none() && test(at).abs() <= most;
+            let Some(at) = at.filter(is_there) else { continue };
+            let half = (kind == Special::Fold)
+                .then(|| self.itinerary.half(&*self.model_at(&at), &at.solution))
+                .flatten();
+            let kind = match &half {
+                Some((half, _)) if half.mirrored => Special::Pitchfork,
+                Some(_) => Special::Flip,
+                None => kind,
             };
-            found.extend(at.filter(is_there).map(|at| SpecialPoint { kind, at, meets: None, touch: None }));
+            if half.is_none() || with_parent {
+                found.push(SpecialPoint { kind, at, meets: None, touch: half });
+            }
         }
         found.sort_by(|a, b| a.at.arclength.total_cmp(&b.at.arclength));
         found

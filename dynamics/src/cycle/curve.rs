@@ -73,13 +73,20 @@ impl Seed {
     pub fn of(part: &Branch, special: &SpecialPoint) -> Option<Seed> {
         let on_branch = || (part.itinerary.clone(), special.at.solution.clone());
         let (condition, (itinerary, solution)) = match special.kind {
+            // Of cycles half as long.
+            Special::Flip | Special::Pitchfork if special.touch.is_some() => {
+                (Condition::Flip, special.touch.clone()?)
+            }
             Special::Fold => (Condition::Fold, on_branch()),
             Special::Flip => (Condition::Flip, on_branch()),
             Special::Grazing | Special::Border => (Condition::Touch, special.touch.clone()?),
             Special::Value => (Condition::Value, on_branch()),
             Special::Pitchfork => return None,
         };
-        Some(Seed { condition, word: part.word.clone(), itinerary, solution })
+        let (half, rest) = part.word.symbols().split_at(part.word.len() / 2);
+        let is_half = special.kind == Special::Flip && special.touch.is_some() && half == rest;
+        let word = if is_half { Word::cyclic(half) } else { part.word.clone() };
+        Some(Seed { condition, word, itinerary, solution })
     }
 
     /// Returns what the motion touches, or that an impact is at its limit.

@@ -1,8 +1,8 @@
 //! Derivatives of a cycle by a parameter.
 //!
-//! States and times of events have exact derivatives, from the equations of the cycle. What is measured along the cycle, and its multipliers,
-//! are functions of cycles at nearby values of the parameter, which solve the same equations to rounding: their derivatives are differences of
-//! sixth order.
+//! The derivatives of states and times of events follow from the linearised equations of the cycle. Those of multipliers and of measured
+//! quantities are differences of sixth order between cycles at nearby values of the parameter. Each of these cycles solves the equations to
+//! rounding.
 
 use super::family::{slope_at_zero, stencil};
 use super::{Cycle, CycleError, Free, own, placed};
@@ -49,7 +49,8 @@ pub struct Derivatives {
 
 impl Cycle {
     /// Returns the derivatives of the cycle, and of `numbers` of it, by a parameter. At an end of the parameter's range they are one-sided.
-    /// `kinds`: for each number, its kind: those of the same kind have the same unit, and rounding errors of about the same size.
+    /// `kinds`: for each number an index. Numbers with the same index have the same unit, so their rounding errors are of about the same
+    /// size.
     ///
     /// # Errors
     /// [`CycleError`] if the cycle has other flights at all nearby values, for example at a graze, or it is at a fold.

@@ -273,8 +273,8 @@ impl<'p> Gpu<'p> {
             ended.into_iter().partition(|(_, record)| is_measured_here || is_unfinished(record));
         ended.par_iter_mut().for_each(|(_, record)| drop_unrequested(record, needs));
         for (id, record) in unfinished {
-            let cell = self.plan.cell(id);
-            let (form, law) = (self.plan.form(cell.flow), self.plan.law(cell.law));
+            let (flow, law) = self.plan.parts(id);
+            let (form, law) = (self.plan.form(flow), self.plan.law(law));
             self.finishing.begin(id, Ended { record, form, law });
         }
         Ok(ended)

@@ -74,6 +74,14 @@ impl Scene {
             add("start.count".into(), draw.count.to_string());
             add("start.seed".into(), draw.seed.to_string());
         }
+        if let Some(sample) = self.sample() {
+            let (name, states) = sample.spread.parts();
+            let numbers = states.map(|state| format!("{:?}", &state[..2 * self.coordinates()]));
+            add("start.sample".into(), format!("{name} {} {}", numbers[0], numbers[1]));
+            add("start.count".into(), sample.count.to_string());
+            add("start.seed".into(), sample.seed.to_string());
+            add("start.width".into(), format!("{:?}", sample.width));
+        }
         if let Some(refine) = self.refine() {
             add("refine.minimum_grid".into(), refine.minimum_grid.to_string());
             add("refine.rounds".into(), refine.rounds.map_or("all".to_owned(), |n| n.to_string()));

@@ -4,10 +4,10 @@ use std::mem::discriminant;
 
 use super::error::SceneError;
 use super::keys;
-use super::limits::MAX_STARTS;
+use super::limits::{MAX_STARTS, MOST_SAMPLED, REPLICATES};
 use super::section::{Field, Section};
 use super::{Purpose, Scene};
-use rattlemap_dynamics::model::{Model, REST, State};
+use rattlemap_dynamics::model::{Model, Oscillator, REST, STATE, Side, State};
 
 /// The state in which cells start, at phase 0 of the oscillator: at the start phase of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,6 +64,38 @@ pub struct Draw {
     pub count: u32,
     /// Seed of the random states.
     pub seed: u32,
+}
+
+/// Random starts for the shares of attractors: the same in all cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sample {
+    /// Distribution of the components of the state, which are independent.
+    pub spread: Spread,
+    /// Largest number of starts per cell, a multiple of [`REPLICATES`].
+    pub count: u32,
+    /// Seed of the random states.
+    pub seed: u32,
+    /// Width of the intervals of all shares at which a cell stops; none runs all starts.
+    pub width: Option<f64>,
+}
+
+/// A distribution of states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// Uniform between these states.
+    Box([State; 2]),
+    /// Normal, with this mean and this standard deviation.
+    Normal([State; 2]),
+}
+
+impl Spread {
+    /// Returns the name in scenes, and both states.
+    pub fn parts(&self) -> (&'static str, &[State; 2]) {
+        match self {
+            Spread::Box(states) => ("box", states),
+            Spread::Normal(states) => ("normal", states),
+        }
+    }
 }
 
 pub(super) fn read(root: &Section<'_>, model: &dyn Model, purpose: Purpose) -> Result<Start, SceneError> {
@@ -131,6 +163,9 @@ fn read_state(field: &Field<'_>, model: &dyn Model) -> Result<State, SceneError>
 /// Reads `count` and `seed`; returns none where each cell has one start.
 pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<Draw>, SceneError> {
     let section = root.section("start", &keys::names("start"))?;
+    if section.get("sample").is_some() {
+        return Ok(None);
+    }
     let seed = section.get("seed").map(|field| field.whole(0..=u32::MAX)).transpose()?;
     let count = section.get("count").map_or(Ok(1), |field| field.whole(1..=MAX_STARTS))?;
     match (section.get("count").filter(|_| count > 1), section.get("seed")) {
@@ -143,10 +178,125 @@ pub(super) fn read_draw(root: &Section<'_>, purpose: Purpose) -> Result<Option<D
     }
 }
 
+/// Reads `sample` and what belongs to it; none without it.
+pub(super) fn read_sample(
+    root: &Section<'_>,
+    model: &dyn Model,
+    purpose: Purpose,
+) -> Result<Option<Sample>, SceneError> {
+    let section = root.section("start", &keys::names("start"))?;
+    let states = ["low", "high", "mean", "deviation"];
+    let Some(field) = section.get("sample") else {
+        let alone = states.into_iter().chain(["width"]).find_map(|name| section.get(name));
+        return match alone {
+            Some(field) => Err(field.conflict("it needs start.sample; set sample = \"box\" or \"normal\"")),
+            None => Ok(None),
+        };
+    };
+    if purpose == Purpose::Bifurcation {
+        return Err(field.conflict("shares need a map; compute a `map`"));
+    }
+    if let Some(other) = ["policy", "state"].into_iter().find_map(|name| section.get(name)) {
+        return Err(other.conflict("start.sample gives all starts; remove one of the two"));
+    }
+    let is_box = field.choice(&[("box", true), ("normal", false)])?;
+    let (own, others) = if is_box { states.split_at(2) } else { (&states[2..], &states[..2]) };
+    if let Some(other) = others.iter().find_map(|name| section.get(name)) {
+        return Err(
+            other.conflict(format!("this sample is described by start.{} and start.{}", own[0], own[1]))
+        );
+    }
+    let names = model.state_names().join(", ");
+    let read = |name: &str| match section.get(name) {
+        Some(field) => Ok((read_state(&field, model)?, field)),
+        None => Err(section.missing(name, &format!("this sample needs {name} = [{names}]"))),
+    };
+    let ((first, _), (second, last)) = (read(own[0])?, read(own[1])?);
+    let bad =
+        (0..model.state_names().len()).find(|&i| if is_box { second[i] < first[i] } else { second[i] < 0.0 });
+    if let Some(i) = bad {
+        let name = &model.state_names()[i];
+        return Err(last.conflict(match is_box {
+            true => format!("{name} must be at least {} there, as in start.low", first[i]),
+            false => format!("the deviation of {name} must not be negative"),
+        }));
+    }
+    let is_point = (0..STATE).all(|i| if is_box { second[i] == first[i] } else { second[i] == 0.0 });
+    if is_point {
+        return Err(last.conflict("all starts would be equal; widen at least one component"));
+    }
+    let Some(count) = section.get("count") else {
+        return Err(section.missing("count", "a sample needs a number of starts, such as count = 256"));
+    };
+    let number = count.whole(REPLICATES..=MOST_SAMPLED)?;
+    if !number.is_multiple_of(REPLICATES) {
+        let nearest = number.next_multiple_of(REPLICATES);
+        return Err(
+            count.conflict(format!("a sample has eight equal parts; use a multiple of 8, such as {nearest}"))
+        );
+    }
+    let seed = section.get("seed").map_or(Ok(1), |field| field.whole(0..=u32::MAX))?;
+    let width = match section.get("width") {
+        Some(field) => match field.number()? {
+            width if width > 0.0 && width < 1.0 => Some(width),
+            _ => return Err(field.out_of_range("a number between 0 and 1, ends excluded")),
+        },
+        None => None,
+    };
+    let spread = if is_box { Spread::Box([first, second]) } else { Spread::Normal([first, second]) };
+    Ok(Some(Sample { spread, count: number, seed, width }))
+}
+
+/// Refuses a box that reaches behind a rigid wall of an oscillator. `cell` names the oscillator's parameters.
+pub(super) fn check_box(
+    section: &Section<'_>,
+    spread: &Spread,
+    oscillator: &Oscillator,
+    cell: &str,
+) -> Result<(), SceneError> {
+    let Spread::Box([low, high]) = spread else { return Ok(()) };
+    for (gap, row) in oscillator.gaps.iter().enumerate() {
+        // The gap is linear in the displacements, so its ends lie at corners of the box.
+        let end = |side: Side| {
+            let of = |(i, factor): (usize, &f64)| {
+                factor * if factor * side.sign() > 0.0 { high[2 * i] } else { low[2 * i] }
+            };
+            row.row.iter().enumerate().map(of).sum::<f64>()
+        };
+        for side in Side::BOTH {
+            let wall = row.walls[side.index()].first().filter(|wall| !wall.contact.is_elastic());
+            if let (Some(wall), Some(field)) = (wall, section.get("high"))
+                && (end(side) - wall.at) * side.sign() > 0.0
+            {
+                let remedy = format!(
+                    "the gap {} reaches {} there, behind its wall at {} ({cell}); make the box smaller",
+                    gap + 1,
+                    end(side),
+                    wall.at
+                );
+                return Err(field.conflict(remedy));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Refuses starts that contradict each other, the axes, or `[refine]`.
 pub(super) fn check(root: &Section<'_>, scene: &Scene) -> Result<(), SceneError> {
     let (follows, is_drawn) = (scene.start.follows(), scene.draw.is_some());
     let section = root.section("start", &keys::names("start"))?;
+    if let Some(sample) = section.get("sample") {
+        let remedy = if scene.sweeps_start() {
+            "the axes give each cell its start; remove the sample"
+        } else if root.get("refine").is_some() {
+            "shares are not interpolated; remove [refine] or the sample"
+        } else if scene.list().is_some() {
+            "shares need two axes; remove the list of cells or the sample"
+        } else {
+            return Ok(());
+        };
+        return Err(sample.conflict(remedy));
+    }
     let is_refined = root.get("refine").is_some();
     let sweeps_start = scene.sweeps_start();
     let sweeps_both = scene.is_basin() && !scene.axes().iter().all(|axis| axis.target().is_start());

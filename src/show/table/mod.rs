@@ -9,6 +9,8 @@ pub mod cells_npy;
 pub mod compare_csv;
 pub mod curve_tables;
 pub mod orbit_tables;
+#[cfg(feature = "files")]
+pub mod share_tables;
 pub mod words_csv;
 
 use std::io::Write;

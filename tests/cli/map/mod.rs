@@ -15,6 +15,7 @@ mod json;
 mod quantities;
 mod records;
 mod shards;
+mod shares;
 mod streams;
 mod torture;
 

@@ -62,10 +62,10 @@ fn the_parser_accepts_exactly_the_ranges_of_the_table() {
                 bad(key, "2");
             }
             Takes::OneOf(names) => {
-                // "state" needs a state, and "both" is for diagrams only.
+                // "state" needs a state, "box" and "normal" need two, and "both" is for diagrams only.
                 names
                     .iter()
-                    .filter(|name| !["state", "both"].contains(*name))
+                    .filter(|name| !["state", "box", "normal", "both"].contains(*name))
                     .for_each(|name| good(key, &format!("\"{name}\"")));
                 bad(key, "\"none\"");
             }
